@@ -58,14 +58,71 @@ class DegreeConditionError(MracDesignError):
 
 
 class NotCoprimeError(MracDesignError):
-    """A and B of a Diophantine equation share roots that are not in the target."""
+    """A and B of a Diophantine equation share roots, to the precision of the arithmetic."""
 
     def __init__(self, common_roots: Sequence[complex]) -> None:
         self.common_roots = tuple(common_roots)
-        roots = ", ".join(f"{root:.6g}" for root in self.common_roots)
+        roots = ", ".join(_root(root) for root in self.common_roots)
         super().__init__(
-            f"A and B share the roots {roots}, which the target polynomial lacks: no R, S can "
-            "move them; cancel the common factor in the plant model first"
+            f"A and B share the roots {roots}: no R, S can move them; cancel the common factor "
+            "in the plant model, or remove the prescribed factor of R or S that meets the plant"
+        )
+
+
+class IllConditionedError(MracDesignError):
+    """Floating arithmetic cannot solve a Diophantine equation well enough."""
+
+    def __init__(
+        self,
+        *,
+        residual: float,
+        limit: float,
+        coprimeness: float,
+        closest_roots: Sequence[complex],
+    ) -> None:
+        self.residual = residual
+        self.limit = limit
+        self.coprimeness = coprimeness
+        self.closest_roots = tuple(closest_roots)
+        roots = ", ".join(_root(root) for root in self.closest_roots)
+        super().__init__(
+            f"the residual of A R + B S = Ac is {residual:.2g} of Ac, more than {limit:.2g}: "
+            f"float64 coefficients of R and S cannot place these poles (A and B come closest at the roots "
+            f"{roots or 'of A'}; smallest singular value {coprimeness:.2g}); move the wanted poles "
+            "nearer to the plant's, or design over the rationals"
+        )
+
+
+class NotCausalError(MracDesignError):
+    """A process or controller would have to know the future."""
+
+    def __init__(self, problem: str, remedy: str) -> None:
+        self.problem = problem
+        self.remedy = remedy
+        super().__init__(f"not causal: {problem}; {remedy}")
+
+
+class CancellationError(MracDesignError):
+    """A zero of the process may not be cancelled."""
+
+    def __init__(self, zeros: Sequence[complex], reason: str) -> None:
+        self.zeros = tuple(zeros)
+        self.reason = reason
+        listed = ", ".join(_root(zero) for zero in self.zeros)
+        super().__init__(
+            f"the process zeros {listed} cannot be cancelled: {reason}; keep them in B⁻"
+        )
+
+
+class ModelFollowingError(MracDesignError):
+    """The wanted model lacks zeros that the controller has to keep."""
+
+    def __init__(self, zeros: Sequence[complex]) -> None:
+        self.zeros = tuple(zeros)
+        listed = ", ".join(_root(zero) for zero in self.zeros)
+        super().__init__(
+            f"the process zeros {listed} are not cancelled, so the closed loop keeps them: give "
+            "Bm these zeros too, or ask for unit static gain only"
         )
 
 
@@ -100,3 +157,20 @@ class SimulationError(MracDesignError):
 
 class Cancelled(MracDesignError):
     """The user interrupted a long run."""
+
+
+class NotebookError(FileError):
+    """A notebook of the report cannot be read, or one of its cells failed."""
+
+
+class RenderingError(MracDesignError):
+    """The executed notebooks cannot be turned into HTML or PDF."""
+
+    def __init__(self, output: str, problem: str) -> None:
+        self.output = output
+        self.problem = problem
+        super().__init__(f"{output} could not be made: {problem}")
+
+
+def _root(root: complex) -> str:
+    return f"{root.real:.6g}" if root.imag == 0 else f"{root:.6g}"

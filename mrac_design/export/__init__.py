@@ -1,0 +1,1 @@
+"""Results and tuned gains as files for other programs."""

@@ -1,0 +1,239 @@
+"""Fit of the dual Fourier model to a recorded track, with its quality on held-back frames.
+
+Run as `python -m mrac_design.motion.fitting RECORDING.csv --out FILE`.
+"""
+
+from __future__ import annotations
+
+import logging
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Annotated
+
+import numpy as np
+import typer
+from scipy.signal import butter, filtfilt
+
+from mrac_design.arrays import FloatArray
+from mrac_design.errors import MotionFileError, MracDesignError
+from mrac_design.motion.beats import find_beats
+from mrac_design.motion.dual_fourier import Breathing, DualFourierModel
+from mrac_design.motion.fit_quality import (
+    MotionStatistics,
+    Residual,
+    generated_statistics,
+    recorded_statistics,
+    residual_of,
+)
+from mrac_design.motion.fit_report import write_fit
+from mrac_design.motion.fit_series import (
+    FASTEST_BREATH,
+    Recording,
+    beat_phase,
+    breathing_frequency,
+    fit_series,
+    fit_variation,
+    lag_one_correlation,
+    series_values,
+    steady_phase,
+)
+from mrac_design.motion.heart import Origin
+from mrac_design.motion.jets import Jet
+from mrac_design.motion.recorded import FILTER_ORDER, low_pass
+from mrac_design.motion.rhythm import VariableRhythm
+from mrac_design.motion.track_file import read_track
+
+logger = logging.getLogger(__name__)
+
+SEEDS = range(1, 21)
+"""Seeds whose motions are compared with the recording."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class Fit:
+    """A fitted model and how well it fits."""
+
+    model: DualFourierModel
+    """The model; its coefficients and statistics come from the training frames alone."""
+    onsets: FloatArray
+    """Beats found in the whole recording, s."""
+    residuals: tuple[Residual, ...]
+    """Residuals on training and held-back frames, the best informed first."""
+    recorded: MotionStatistics
+    """Statistics of the recording."""
+    generated: MotionStatistics
+    """Statistics of motions the model generates, mean over several seeds."""
+
+
+def fit_recording(
+    recording: Recording, *, name: str, source: str, assumptions: tuple[str, ...], seed: int
+) -> Fit:
+    """Fit beats, breathing, their product and the beat-to-beat variation to `recording`.
+
+    Beat times are measured in all frames, with a template from the training frames: the first
+    residual tells how well the fitted shapes carry over to later beats, the others what is
+    left when the later beats' times are not measured.
+    """
+    t, end = recording.time, recording.training_time
+    breath = breathing_frequency(recording)
+    respiratory = steady_phase(t, breath)
+    b, a = butter(3, FASTEST_BREATH / (0.5 * recording.frame_rate), "high")
+    beating = filtfilt(b, a, recording.position, axis=0)
+    found = find_beats(beating, frame_rate=recording.frame_rate, training=recording.training)
+    known = found.onsets[found.onsets < end]
+    intervals = np.diff(known)
+    period = float(intervals.mean())
+    logger.info(
+        "%d beats, mean interval %.4f s, breath %.4f s", found.onsets.size, period, 1.0 / breath
+    )
+    systole = _best_systole(recording, found.onsets, period, respiratory)
+    phase = beat_phase(t, found.onsets, period=period, systole=systole)
+    coefficients = fit_series(recording, phase, respiratory)
+    fitted = series_values(coefficients, phase, respiratory)
+    training = slice(0, recording.training)
+    model = DualFourierModel(
+        name=name,
+        origin=Origin.FITTED,
+        source=source,
+        assumptions=assumptions,
+        coefficients=coefficients,
+        rhythm=VariableRhythm(
+            mean_period=period,
+            deviation=float(intervals.std(ddof=1)),
+            correlation=lag_one_correlation(intervals),
+        ),
+        systole=systole,
+        breathing=Breathing(frequency=breath),
+        variation=fit_variation(
+            (recording.position - fitted)[training],
+            t[training],
+            known,
+            Jet(
+                value=phase.value[training],
+                rate=phase.rate[training],
+                second_rate=phase.second_rate[training],
+            ),
+            period,
+        ),
+        seed=seed,
+    )
+    coasting = beat_phase(t, known, period=period, systole=systole)
+    return Fit(
+        model=model,
+        onsets=found.onsets,
+        residuals=(
+            residual_of(recording, fitted, "measured in all frames"),
+            residual_of(
+                recording,
+                series_values(coefficients, coasting, respiratory),
+                "measured in training frames, the mean interval afterwards",
+            ),
+            _one_period_residual(recording, respiratory, period),
+        ),
+        recorded=recorded_statistics(recording),
+        generated=generated_statistics(model, float(t[-1]), SEEDS),
+    )
+
+
+def _best_systole(
+    recording: Recording, onsets: FloatArray, period: float, respiratory: Jet
+) -> float:
+    """Length of the inelastic start of the beat that fits the training frames best, s."""
+
+    def cost(systole: float) -> float:
+        phase = beat_phase(recording.time, onsets, period=period, systole=systole)
+        fitted = series_values(fit_series(recording, phase, respiratory), phase, respiratory)
+        error = (recording.position - fitted)[: recording.training]
+        return float(np.mean(error**2))
+
+    choices = period * np.arange(0.0, 0.80, 0.05)
+    return float(choices[int(np.argmin([cost(item) for item in choices]))])
+
+
+def _one_period_residual(recording: Recording, respiratory: Jet, period: float) -> Residual:
+    """Residual of the same series when all beats are equally long, the length fitted."""
+    best, best_cost, best_values = period, np.inf, recording.position
+    for candidate in period * np.linspace(0.93, 1.07, 141):
+        phase = steady_phase(recording.time, 1.0 / candidate)
+        values = series_values(fit_series(recording, phase, respiratory), phase, respiratory)
+        cost = float(np.mean((recording.position - values)[: recording.training] ** 2))
+        if cost < best_cost:
+            best, best_cost, best_values = candidate, cost, values
+    return residual_of(recording, best_values, f"one interval of {best:.4f} s throughout")
+
+
+def fit_file(
+    path: Path, *, name: str, point: str, frame_rate: float, cutoff: float, training: int, seed: int
+) -> Fit:
+    """Fit one point of a track file; rates in Hz, `training` frames are fitted.
+
+    Raises MotionFileError and ParameterError as `read_recorded_motion`.
+    """
+    track = read_track(path, point=point)
+    position = low_pass(track.position, frame_rate=frame_rate, cutoff=cutoff, path=path)
+    if not 0 < training < position.shape[0]:
+        raise MotionFileError(
+            path, "", f"{position.shape[0]} frames: too few to fit {training} and judge by the rest"
+        )
+    recording = Recording(position=position, frame_rate=frame_rate, training=training)
+    held_back = f"{training + 1}–{position.shape[0]}"
+    return fit_recording(
+        recording,
+        name=name,
+        source=(
+            "Fitted to an in-vivo stereo-endoscope track of a point on a beating heart: Zhang, "
+            "Yao, Yang, Zheng, Liu, “Motion Prediction of Beating Heart Using Spatio-Temporal "
+            "LSTM”, IEEE Signal Processing Letters 29:787–791, 2022; repository zwr-04/ST-LSTM, "
+            f"MIT licence; point {point}, frames 1–{training} fitted, {held_back} held back."
+        ),
+        assumptions=(
+            f"The frame rate is taken as {frame_rate:g} Hz; the source states none.",
+            "Camera axes x, y, z are taken as the robot's X, Y, Z.",
+            "Species, stabiliser, calibration and tracking accuracy are not stated by the source.",
+            f"Zero-phase Butterworth low-pass of order {FILTER_ORDER}, run forwards and "
+            f"backwards, cut-off {cutoff:g} Hz.",
+            "Beat lengths and shapes are drawn at random with the recording's statistics; "
+            "breathing is strictly periodic.",
+        ),
+        seed=seed,
+    )
+
+
+def main(
+    recording: Annotated[Path, typer.Argument(help="Track file, .csv or .mat.")],
+    out: Annotated[Path, typer.Option(help="Model file to write, TOML.")],
+    name: Annotated[str, typer.Option(help="Name of the model.")] = "heart_invivo_fit",
+    point: Annotated[str, typer.Option(help="Tracked point.")] = "p4",
+    frame_rate: Annotated[float, typer.Option(help="Frames a second (assumed).")] = 25.0,
+    cutoff: Annotated[float, typer.Option(help="Cut-off of the low-pass, Hz.")] = 8.0,
+    training: Annotated[int, typer.Option(help="Leading frames to fit.")] = 600,
+    seed: Annotated[int, typer.Option(help="Seed written into the model.")] = 1,
+) -> None:
+    """Fit the dual Fourier heart-motion model to a recorded track and write it as TOML."""
+    logging.basicConfig(level=logging.INFO, format="%(message)s")
+    try:
+        fit = fit_file(
+            recording,
+            name=name,
+            point=point,
+            frame_rate=frame_rate,
+            cutoff=cutoff,
+            training=training,
+            seed=seed,
+        )
+        write_fit(fit, out)
+    except MracDesignError as error:
+        logger.error("%s", error)
+        raise typer.Exit(code=2) from error
+    for residual in fit.residuals:
+        logger.info(
+            "beats %s: held-back residual %s mm, explained %s",
+            residual.beat_times,
+            np.round(residual.held_back_rms * 1e3, 3),
+            np.round(residual.held_back_explained, 3),
+        )
+    logger.info("wrote %s", out)
+
+
+if __name__ == "__main__":
+    typer.run(main)

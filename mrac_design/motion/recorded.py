@@ -1,0 +1,101 @@
+"""Heart motion from a recorded track of camera frames, CSV or MATLAB."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+from scipy.interpolate import CubicSpline
+from scipy.signal import butter, filtfilt
+
+from mrac_design.arrays import FloatArray
+from mrac_design.errors import MotionFileError, ParameterError
+from mrac_design.motion.heart import HeartMotion, Origin, centred_motion
+from mrac_design.motion.signal import from_ppoly
+from mrac_design.motion.track_file import read_track
+
+FILTER_ORDER = 4
+"""Order of the Butterworth low-pass, run forwards and then backwards over a track."""
+
+
+def read_recorded_motion(
+    path: Path | str,
+    *,
+    point: str = "p4",
+    frame_rate: float,
+    cutoff: float = 8.0,
+    duration: float | None = None,
+    start_frame: int = 0,
+    unit: str | None = None,
+) -> HeartMotion:
+    """Read one tracked point as a heart motion: low-pass, mean off, cubic spline.
+
+    `point` names the columns `<point>_x_<unit>`, `_y_`, `_z_`; `unit` (m, cm, mm, um) is
+    needed only where the names carry none. `frame_rate` and `cutoff` in Hz. The motion starts
+    `start_frame` frames after the first and lasts `duration` s, or to the end of the track.
+
+    Raises MotionFileError for a file that cannot be used and ParameterError for a cut-off
+    outside 0 … frame_rate / 2.
+    """
+    file = Path(path)
+    if not (np.isfinite(frame_rate) and frame_rate > 0.0):
+        raise MotionFileError(
+            file, "frame rate", f"{frame_rate} Hz: must be a positive number of frames a second"
+        )
+    track = read_track(file, point=point, unit=unit)
+    filtered = low_pass(track.position, frame_rate=frame_rate, cutoff=cutoff, path=file)
+    if not 0 <= start_frame < filtered.shape[0] - 1:
+        raise MotionFileError(
+            file, "start frame", f"{start_frame}: the track has frames 0 … {filtered.shape[0] - 1}"
+        )
+    used = filtered[start_frame:]
+    available = (used.shape[0] - 1) / frame_rate
+    length = available if duration is None else duration
+    if not (np.isfinite(length) and length > 0.0):
+        raise ParameterError("duration", length, "must be a positive time in s")
+    if length > available * (1.0 + 1e-12):
+        raise MotionFileError(
+            file,
+            f"{used.shape[0]} frames",
+            f"last {available:.6g} s at {frame_rate:g} Hz, but {length:.6g} s are asked for: "
+            "shorten the duration or take a longer recording",
+        )
+    spline = from_ppoly(CubicSpline(np.arange(used.shape[0]) / frame_rate, used))
+    return centred_motion(
+        name=f"{file.stem} {point}",
+        origin=Origin.RECORDED,
+        source=f"{file.name}, point {point}, from frame {start_frame}",
+        assumptions=(
+            f"The frame rate is taken as {frame_rate:g} Hz.",
+            "Camera axes x, y, z are taken as the robot's X, Y, Z.",
+            f"Zero-phase Butterworth low-pass of order {FILTER_ORDER}, run forwards and "
+            f"backwards, cut-off {cutoff:g} Hz.",
+            f"Between frames a cubic spline: nothing above {frame_rate / 2:g} Hz was recorded.",
+        ),
+        displacement=spline if length >= available else spline.restricted(0.0, length),
+    )
+
+
+def low_pass(position: FloatArray, *, frame_rate: float, cutoff: float, path: Path) -> FloatArray:
+    """Zero-phase low-pass of a track (frames, 3); rates in Hz; `path` is named in errors.
+
+    Raises ParameterError for a cut-off outside 0 … frame_rate / 2 and MotionFileError for a
+    track shorter than the filter needs.
+    """
+    nyquist = 0.5 * frame_rate
+    if not 0.0 < cutoff < nyquist:
+        raise ParameterError(
+            "cutoff",
+            f"{cutoff:g} Hz",
+            f"must lie between 0 and {nyquist:g} Hz, half the frame rate of {frame_rate:g} Hz",
+        )
+    padding = 3 * (FILTER_ORDER + 1)
+    if position.shape[0] <= padding:
+        raise MotionFileError(
+            path,
+            f"{position.shape[0]} frames",
+            f"too short: the low-pass filter needs more than {padding}",
+        )
+    b, a = butter(FILTER_ORDER, cutoff / nyquist)
+    filtered: FloatArray = filtfilt(b, a, position, axis=0, padlen=padding)
+    return filtered

@@ -1,0 +1,39 @@
+-- Code of notebook cells: folded in HTML, left out of the PDF. Figures and tables with a
+-- caption are numbered here, so that both outputs carry the same numbers.
+
+local function cell(block)
+  if not block.classes:includes("cell") then
+    return nil
+  end
+  if FORMAT:match("html") then
+    return {
+      pandoc.RawBlock("html", "<details class=\"code\"><summary>Code</summary>"),
+      pandoc.CodeBlock(block.text, pandoc.Attr("", { "python" })),
+      pandoc.RawBlock("html", "</details>"),
+    }
+  end
+  return {}
+end
+
+local function numberer(word)
+  local count = 0
+  return function(element)
+    local first = element.caption.long[1]
+    if first == nil then
+      return nil
+    end
+    count = count + 1
+    first.content:insert(1, pandoc.Strong(word .. " " .. count .. "."))
+    first.content:insert(2, pandoc.Space())
+    return element
+  end
+end
+
+return {
+  {
+    traverse = "topdown",
+    CodeBlock = cell,
+    Figure = numberer("Figure"),
+    Table = numberer("Table"),
+  },
+}

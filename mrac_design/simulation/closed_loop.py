@@ -1,0 +1,161 @@
+"""The robot on the heart under force control, as one hybrid system.
+
+reference ─► axis controllers ─u─► linearisation ─Γ─► robot ─X─► spring ─Fe─┐
+                   ▲                    ▲                          ▲        │
+                   └────────────────────┴───── Fe ─────────────── X − Xh ◄──┘
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import casadi as ca
+import numpy as np
+from numpy.typing import ArrayLike
+
+from mrac_design.arrays import FloatArray, readonly
+from mrac_design.controller.linearisation import Linearisation
+from mrac_design.controller.step import ControllerStep
+from mrac_design.errors import ParameterError
+from mrac_design.layout import Layout
+from mrac_design.robot import RobotDynamics, check_posture, inertial_parameters
+from mrac_design.simulation.system import ARGUMENT_NAMES, HybridSystem
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class ForceLoop:
+    """A closed loop ready to run, and what is needed to start it and to read its outputs."""
+
+    system: HybridSystem
+    """The equations; inputs are heart position (m) and force reference (N), k of each."""
+    parameter_values: FloatArray
+    """Values of the system's parameters."""
+    dynamics: RobotDynamics
+    """The true robot."""
+    controllers: tuple[ControllerStep, ...]
+    """One controller a force axis."""
+
+
+def build_force_loop(
+    dynamics: RobotDynamics,
+    linearisation: Linearisation,
+    controllers: Sequence[ControllerStep],
+    *,
+    stiffness: ArrayLike,
+) -> ForceLoop:
+    """Close the loop over a two-sided spring of true `stiffness` Ks (N/m, one or one per axis).
+
+    Efforts are limited to the robot's own limits. Raises ParameterError for a bad stiffness.
+    """
+    robot = dynamics.description
+    axes, n = robot.force_axes, robot.joint_count
+    springs = np.broadcast_to(np.asarray(stiffness, dtype=float), (len(axes),))
+    if not np.all((springs > 0) & np.isfinite(springs)):
+        raise ParameterError("stiffness", springs, "must be finite and > 0 N/m")
+    values = {
+        "inertia": inertial_parameters(robot),
+        "effort_limit": robot.effort_limits,
+        "stiffness": springs,
+        "linearisation": linearisation.parameter_values,
+        **{f"controller_{a}": c.parameter_values for a, c in zip(axes, controllers, strict=True)},
+    }
+    parameters = Layout(tuple((name, np.size(value)) for name, value in values.items()))
+    state = Layout(
+        (
+            ("joint_position", n),
+            ("joint_velocity", n),
+            *((f"controller_{a}", c.state.size) for a, c in zip(axes, controllers, strict=True)),
+        )
+    )
+    inputs = Layout((("heart", len(axes)), ("reference", len(axes))))
+    system = _system(dynamics, linearisation, controllers, state, inputs, parameters)
+    return ForceLoop(
+        system=system,
+        parameter_values=parameters.pack(values),
+        dynamics=dynamics,
+        controllers=tuple(controllers),
+    )
+
+
+def _system(
+    dynamics: RobotDynamics,
+    linearisation: Linearisation,
+    controllers: Sequence[ControllerStep],
+    state: Layout,
+    inputs: Layout,
+    parameters: Layout,
+) -> HybridSystem:
+    axes = dynamics.description.force_axes
+    k = len(axes)
+    held = Layout(())
+    x, z = state.symbols("state"), held.symbols("held")
+    v, p = inputs.symbols("input"), parameters.symbols("parameters")
+    states, exogenous, symbols = state.split(x), inputs.split(v), parameters.split(p)
+    q, qd = states["joint_position"], states["joint_velocity"]
+
+    tip = dynamics.task_position(q)[:k]
+    force = symbols["stiffness"] * (tip - exogenous["heart"])
+    commands, following, signals = [], [], []
+    for i, (axis, step) in enumerate(zip(axes, controllers, strict=True)):
+        own, reference = states[f"controller_{axis}"], exogenous["reference"][i]
+        own_parameters = symbols[f"controller_{axis}"]
+        command = step.command(own, force[i], reference, own_parameters)
+        advanced, signal = step.advance(own, force[i], reference, command, own_parameters)
+        commands.append(command)
+        following.append(advanced)
+        signals.append(step.signals.split(signal))
+    command = ca.vertcat(*commands)
+    wanted = linearisation.torque(q, qd, force, command, symbols["linearisation"])
+    limit = symbols["effort_limit"]
+    effort = ca.fmax(ca.fmin(wanted, limit), -limit)
+    J = dynamics.task_jacobian(q)
+    qdd = dynamics.forward_dynamics(q, qd, effort - J[:k, :].T @ force, symbols["inertia"])
+    rate = ca.vertcat(qd, qdd, *following)
+
+    recorded = {
+        "force": force,
+        "force_reference": exogenous["reference"],
+        "tip": tip,
+        "heart": exogenous["heart"],
+        "effort": effort,
+        "joint_position": q,
+        "joint_velocity": qd,
+        "command": command,
+        **{name: ca.vertcat(*(s[name] for s in signals)) for name in signals[0]},
+    }
+    outputs = Layout(tuple((name, value.numel()) for name, value in recorded.items()))
+    arguments = [x, z, v, p]
+    return HybridSystem(
+        state=state,
+        held=held,
+        inputs=inputs,
+        parameters=parameters,
+        outputs=outputs,
+        rate=ca.Function("rate", arguments, [rate], list(ARGUMENT_NAMES), ["rate"]),
+        output=ca.Function(
+            "output", arguments, [outputs.join(recorded)], list(ARGUMENT_NAMES), ["output"]
+        ),
+    )
+
+
+def resting_state(
+    loop: ForceLoop, *, posture: ArrayLike, force: ArrayLike, condition_limit: float
+) -> FloatArray:
+    """The loop at rest at a posture, every controller settled on its force (N, k values).
+
+    Raises SingularPostureError when the task Jacobian's condition number there exceeds
+    `condition_limit`.
+    """
+    check_posture(loop.dynamics, posture, condition_limit)
+    axes = loop.dynamics.description.force_axes
+    n = loop.dynamics.description.joint_count
+    settled = {
+        f"controller_{axis}": step.equilibrium(float(level), step.parameter_values).full().ravel()
+        for axis, step, level in zip(axes, loop.controllers, np.ravel(force), strict=True)
+    }
+    return readonly(
+        loop.system.state.pack(
+            {"joint_position": posture, "joint_velocity": np.zeros(n), **settled}
+        )
+    )

@@ -1,0 +1,94 @@
+"""Running a hybrid system over a schedule."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from itertools import pairwise
+
+import numpy as np
+
+from mrac_design.arrays import FloatArray, readonly
+from mrac_design.errors import SimulationError
+from mrac_design.motion.signal import PiecewisePolynomial
+from mrac_design.simulation.engine import Engine
+from mrac_design.simulation.schedule import build_schedule
+from mrac_design.simulation.system import HybridSystem
+
+Progress = Callable[[float], None]
+"""Called with the finished fraction of a run, 0 to 1; may raise to cancel it."""
+
+_CHUNKS = 50
+"""Parts a run is cut into: how often progress is shown and an interruption is noticed."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class RunSettings:
+    """How a run is stepped and recorded."""
+
+    duration: float
+    """Length of the run (s)."""
+    step: float
+    """Largest integration step (s)."""
+    record_period: float
+    """Time between recorded samples (s)."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class Recording:
+    """Raw outputs of a run, one row a recording instant."""
+
+    time: FloatArray
+    """Recording instants (s), shape (N,)."""
+    outputs: FloatArray
+    """Outputs in the system's layout, shape (N, outputs.size)."""
+    final_state: FloatArray
+    """State at the end of the run, shape (state.size,)."""
+
+
+def run(
+    engine: Engine,
+    system: HybridSystem,
+    *,
+    inputs: PiecewisePolynomial,
+    parameters: FloatArray,
+    initial_state: FloatArray,
+    settings: RunSettings,
+    progress: Progress | None = None,
+) -> Recording:
+    """Integrate `system` on `engine` from `initial_state` under `inputs`.
+
+    Raises SimulationError, naming the instant, when a recorded output is no longer finite.
+    """
+    schedule = build_schedule(
+        inputs,
+        duration=settings.duration,
+        step=settings.step,
+        record_period=settings.record_period,
+        sampling_period=system.sampling_period,
+    )
+    coefficients = np.ascontiguousarray(inputs.coefficients.transpose(1, 0, 2))
+    state, held = np.array(initial_state, dtype=float), np.zeros(system.held.size)
+    time = schedule.start[schedule.records]
+    rows: list[FloatArray] = []
+    edges = np.linspace(0, schedule.length.size, _CHUNKS + 1).astype(int)
+    for first, last in pairwise(edges):
+        rows.append(engine.run(schedule, slice(first, last), coefficients, parameters, state, held))
+        _require_finite(rows, time, state)
+        if progress is not None:
+            progress(last / schedule.length.size)
+    return Recording(
+        time=readonly(time), outputs=readonly(np.vstack(rows)), final_state=readonly(state)
+    )
+
+
+def _require_finite(rows: list[FloatArray], time: FloatArray, state: FloatArray) -> None:
+    finite = np.isfinite(rows[-1]).all(axis=1)
+    if finite.all() and np.isfinite(state).all():
+        return
+    done = sum(len(part) for part in rows[:-1])
+    index = done + (int(np.argmin(finite)) if not finite.all() else len(finite) - 1)
+    raise SimulationError(
+        f"the simulation left the range of finite numbers near t = {time[index]:.4g} s: the loop "
+        "is unstable, or the integration step is too long for it"
+    )

@@ -1,0 +1,250 @@
+"""A scenario: every choice of one study, read from a file or made by hand."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TypeVar
+
+import tomli_w
+
+from mrac_design.controller.adaptation import AdaptationLaw, GradientLaw, NormalisedGradientLaw
+from mrac_design.controller.linearisation import RobotModelError
+from mrac_design.design import ReferenceModel
+from mrac_design.errors import ParameterError, ScenarioFileError
+from mrac_design.motion import ForceReference, StepSequence
+from mrac_design.resources import models_directory
+from mrac_design.strict_toml import Table, read_table
+
+_Section = TypeVar("_Section")
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class MotionChoice:
+    """Which heart motion drives the study."""
+
+    source: str
+    """Name of a packaged motion, or path of a recording."""
+    frame_rate: float
+    """Frames a second (Hz) of a recording; assumed where the recording does not state it."""
+    point: str
+    """Tracked point of a recording."""
+    cutoff: float
+    """Cutoff of the zero-phase low-pass on a recording (Hz)."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class DesignChoice:
+    """The controller's design parameters."""
+
+    stiffness: float
+    """Ks the controller is made for (N/m)."""
+    velocity_gain: float
+    """K2 of the velocity loop (1/s)."""
+    bandwidth: float
+    """ω of the reference model (rad/s)."""
+    damping: float
+    """ξ of the reference model."""
+    observer_pole: float
+    """ao of the observer polynomial Ao = p + ao (rad/s)."""
+    tool_axis_bandwidth: float
+    """Bandwidth of the PD control of the tool axis (rad/s)."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class AdaptationChoice:
+    """The adaptation law and its gains."""
+
+    law: str
+    """"normalised" or "gradient"."""
+    gain: float
+    """Scaled gain γ̂."""
+    normalisation: float
+    """α of the normalised law (N²)."""
+    bias_force: float
+    """Size of the constant regressor (N); 0 leaves it out."""
+
+    def build(self, gain: float) -> AdaptationLaw:
+        """The law with `gain` in place of its own (0 for the frozen controller)."""
+        return LAWS[self.law](gain, self.normalisation)
+
+
+LAWS: Mapping[str, Callable[[float, float], AdaptationLaw]] = {
+    "normalised": lambda gain, alpha: NormalisedGradientLaw(gain=gain, alpha=alpha),
+    "gradient": lambda gain, _: GradientLaw(gain=gain),
+}
+"""Adaptation laws a scenario can name, made from (γ̂, α)."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class SimulationChoice:
+    """How the study is run and judged."""
+
+    duration: float
+    """Length of the run (s)."""
+    step: float
+    """Largest integration step (s)."""
+    record_period: float
+    """Time between recorded samples (s)."""
+    settling: float
+    """Time at the start left out of the figures of merit (s)."""
+    condition_limit: float
+    """Largest condition number of the task Jacobian that is accepted."""
+
+    def __post_init__(self) -> None:
+        for name in ("duration", "step", "record_period", "condition_limit"):
+            value = getattr(self, name)
+            if not 0 < value < float("inf"):
+                raise ParameterError(name, value, "must be a finite number > 0")
+        if not 0 <= self.settling < self.duration:
+            raise ParameterError(
+                "settling", self.settling, f"must lie in [0, duration = {self.duration:g} s)"
+            )
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Scenario:
+    """Everything a study depends on."""
+
+    name: str
+    """Short name."""
+    title: str
+    """Title of the report."""
+    robot: str
+    """Name of a packaged robot, or path of a robot file."""
+    motion: MotionChoice
+    """Heart motion."""
+    stiffness: float
+    """True Ks of the tissue (N/m)."""
+    design: DesignChoice
+    """Controller design."""
+    prefilter: ReferenceModel
+    """Pre-filter Hm of the force reference."""
+    adaptation: AdaptationChoice
+    """Adaptation."""
+    model_error: RobotModelError
+    """Error of the controller's robot model."""
+    reference: ForceReference
+    """Force reference before the pre-filter, axis by axis."""
+    simulation: SimulationChoice
+    """Run settings."""
+
+
+def available_scenarios() -> tuple[str, ...]:
+    """Names of the scenarios that come with the package, sorted."""
+    return tuple(sorted(path.stem for path in (models_directory() / "scenarios").glob("*.toml")))
+
+
+def load_scenario(name_or_path: str | Path) -> Scenario:
+    """Scenario of a packaged name or of a TOML file's path.
+
+    Relative paths inside the file count from the file's own folder. Raises ScenarioFileError,
+    naming file and key, for anything missing, misspelt or outside its range.
+    """
+    path = Path(name_or_path)
+    if isinstance(name_or_path, str) and name_or_path in available_scenarios():
+        path = models_directory() / "scenarios" / f"{name_or_path}.toml"
+    elif not path.exists():
+        names = ", ".join(available_scenarios())
+        raise ScenarioFileError(
+            path, "", f"no such scenario file, nor one of the scenarios {names}"
+        )
+    root = read_table(path, ScenarioFileError)
+    root.only(
+        "name", "title", "robot", "motion", "contact", "design", "prefilter", "adaptation",
+        "model_error", "reference", "simulation",
+    )  # fmt: skip
+    contact = root.table("contact")
+    contact.only("stiffness")
+    return Scenario(
+        name=root.text("name"),
+        title=root.text("title"),
+        robot=_beside(path, root.text("robot")),
+        motion=_motion(root.table("motion")),
+        stiffness=contact.number("stiffness"),
+        design=_section(root.table("design"), DesignChoice),
+        prefilter=_section(root.table("prefilter"), ReferenceModel),
+        adaptation=_adaptation(root.table("adaptation")),
+        model_error=_section(root.table("model_error"), RobotModelError),
+        reference=_reference(root.table("reference")),
+        simulation=_section(root.table("simulation"), SimulationChoice),
+    )
+
+
+def save_scenario(scenario: Scenario, path: Path) -> None:
+    """Write a scenario file that `load_scenario` reads back to an equal scenario.
+
+    The file appears whole or not at all.
+    """
+    content = {
+        "name": scenario.name,
+        "title": scenario.title,
+        "robot": scenario.robot,
+        "motion": _entries(scenario.motion),
+        "contact": {"stiffness": scenario.stiffness},
+        "design": _entries(scenario.design),
+        "prefilter": _entries(scenario.prefilter),
+        "adaptation": _entries(scenario.adaptation),
+        "model_error": _entries(scenario.model_error),
+        "reference": {
+            axis: {"times": list(steps.times), "levels": list(steps.levels)}
+            for axis, steps in zip("XYZ", scenario.reference.steps, strict=False)
+        },
+        "simulation": _entries(scenario.simulation),
+    }
+    temporary = path.with_suffix(".toml.part")
+    temporary.write_text(tomli_w.dumps(content), encoding="utf-8")
+    os.replace(temporary, path)
+
+
+def _entries(section: object) -> dict[str, float | str]:
+    return {name: getattr(section, name) for name in section.__dataclass_fields__}  # type: ignore[attr-defined]
+
+
+def _section(table: Table, kind: type[_Section]) -> _Section:
+    names = tuple(kind.__dataclass_fields__)  # type: ignore[attr-defined]
+    table.only(*names)
+    return table.build(lambda: kind(**{name: table.number(name) for name in names}))
+
+
+def _motion(table: Table) -> MotionChoice:
+    table.only("source", "frame_rate", "point", "cutoff")
+    return MotionChoice(
+        source=_beside(table.path, table.text("source")),
+        frame_rate=table.number("frame_rate"),
+        point=table.text("point"),
+        cutoff=table.number("cutoff"),
+    )
+
+
+def _adaptation(table: Table) -> AdaptationChoice:
+    table.only("law", "gain", "normalisation", "bias_force")
+    table.choice("law", LAWS)
+    choice = AdaptationChoice(
+        law=table.text("law"),
+        gain=table.number("gain"),
+        normalisation=table.number("normalisation"),
+        bias_force=table.number("bias_force"),
+    )
+    table.build(lambda: choice.build(choice.gain))
+    return choice
+
+
+def _reference(table: Table) -> ForceReference:
+    axes = [axis for axis in "XYZ" if axis in table.entries]
+    table.only(*(axes or "XYZ"))
+    steps = []
+    for axis in axes:
+        own = table.table(axis)
+        own.only("times", "levels")
+        times, levels = own.numbers("times"), own.numbers("levels")
+        steps.append(own.build(lambda t=times, y=levels: StepSequence(times=t, levels=y)))
+    return ForceReference(steps=tuple(steps))
+
+
+def _beside(scenario_file: Path, name_or_path: str) -> str:
+    """A path relative to the scenario file as one that works from anywhere; names stay."""
+    candidate = scenario_file.parent / name_or_path
+    return str(candidate.resolve()) if candidate.is_file() else name_or_path

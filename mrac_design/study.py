@@ -1,0 +1,256 @@
+"""A study from scenario to record: composition only, every step is a function of its own."""
+
+from __future__ import annotations
+
+import logging
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from mrac_design.controller.adaptive import AdaptiveRST, build_step, nominal_gains
+from mrac_design.controller.linearisation import build_linearisation, home_task_position
+from mrac_design.controller.reference import DirectReference, ModelInverse, ReferenceFeedforward
+from mrac_design.design import RSTDesign, RSTSpecification, design_rst
+from mrac_design.errors import ScenarioFileError
+from mrac_design.metrics.tracking import TrackingMetrics, max_torque, tracking_metrics
+from mrac_design.motion import HeartMotion, available_motions, load_motion, read_recorded_motion
+from mrac_design.motion.signal import PiecewisePolynomial, stack
+from mrac_design.plant import ForcePlant
+from mrac_design.robot import RobotDescription, RobotDynamics, build_dynamics, load_robot
+from mrac_design.robot.posture import condition_numbers
+from mrac_design.simulation.closed_loop import ForceLoop, build_force_loop, resting_state
+from mrac_design.simulation.engine import Engine, build_engine
+from mrac_design.simulation.readout import force_loop_trajectory
+from mrac_design.simulation.run import Progress, RunSettings, run
+from mrac_design.simulation.scenario import Scenario
+from mrac_design.simulation.tableau import RK4
+from mrac_design.simulation.trajectory import Trajectory
+from mrac_design.time_domain import Continuous
+
+_LOG = logging.getLogger(__name__)
+
+
+@dataclass(frozen=True, slots=True)
+class Variant:
+    """One of the controllers a study compares; all share design and linearisation."""
+
+    name: str
+    """Key in tables and files."""
+    title: str
+    """Name for people."""
+    adapts: bool
+    """Whether the gains move."""
+    feedforward: ReferenceFeedforward
+    """What enters the loop as u_c."""
+
+
+VARIANTS = (
+    Variant("frozen", "frozen RST", False, DirectReference()),
+    Variant("adaptive", "adaptive", True, DirectReference()),
+    Variant("adaptive_inverse", "adaptive + model inverse", True, ModelInverse()),
+)
+"""The frozen controller comes first: whatever adaptation buys is bought beyond it."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class StudyRecord:
+    """Everything a report, an export or a reader needs of a study."""
+
+    scenario: Scenario
+    """The choices."""
+    robot: RobotDescription
+    """The true robot."""
+    motion: HeartMotion
+    """The heart motion."""
+    plant: ForcePlant
+    """What the controller is designed for."""
+    design: RSTDesign
+    """The RST design."""
+    trajectories: Mapping[str, Trajectory]
+    """Simulated runs by variant."""
+    tracking: Mapping[str, Mapping[str, TrackingMetrics]]
+    """Force tracking by variant and axis."""
+    max_torque: Mapping[str, Mapping[str, float]]
+    """Largest torque by variant and motor (N·m)."""
+    worst_condition: float
+    """Largest condition number of the task Jacobian met in any run."""
+
+
+def run_study(scenario: Scenario, progress: Progress | None = None) -> StudyRecord:
+    """Design, simulate and judge every variant of `scenario`.
+
+    Raises the package's errors for anything in the scenario that cannot be.
+    """
+    robot = load_robot(scenario.robot)
+    _check_axes(scenario, robot)
+    motion = scenario_motion(scenario)
+    design = scenario_design(scenario)
+    dynamics = build_dynamics(robot)
+    trajectories = simulate_variants(
+        scenario, dynamics, design, motion, variants=VARIANTS, progress=progress
+    )
+    settling = scenario.simulation.settling
+    return StudyRecord(
+        scenario=scenario,
+        robot=robot,
+        motion=motion,
+        plant=design.specification.plant,
+        design=design,
+        trajectories=trajectories,
+        tracking={
+            name: tracking_metrics(run_, settling=settling) for name, run_ in trajectories.items()
+        },
+        max_torque={name: max_torque(run_) for name, run_ in trajectories.items()},
+        worst_condition=_worst_condition(scenario, dynamics, trajectories),
+    )
+
+
+def scenario_motion(scenario: Scenario) -> HeartMotion:
+    """The scenario's heart motion, long enough for its run."""
+    choice = scenario.motion
+    if choice.source in available_motions():
+        return load_motion(choice.source, duration=scenario.simulation.duration)
+    return read_recorded_motion(
+        choice.source,
+        point=choice.point,
+        frame_rate=choice.frame_rate,
+        cutoff=choice.cutoff,
+        duration=scenario.simulation.duration,
+    )
+
+
+def scenario_design(scenario: Scenario) -> RSTDesign:
+    """The scenario's RST design."""
+    choice = scenario.design
+    from mrac_design.design import ReferenceModel
+
+    return design_rst(
+        RSTSpecification(
+            plant=ForcePlant(stiffness=choice.stiffness, velocity_gain=choice.velocity_gain),
+            reference_model=ReferenceModel(bandwidth=choice.bandwidth, damping=choice.damping),
+            observer_pole=choice.observer_pole,
+        )
+    )
+
+
+def variant_controller(scenario: Scenario, design: RSTDesign, variant: Variant) -> AdaptiveRST:
+    """The axis controller of a variant, the same on every force axis."""
+    gain = scenario.adaptation.gain if variant.adapts else 0.0
+    return AdaptiveRST(
+        design=design,
+        prefilter=scenario.prefilter,
+        law=scenario.adaptation.build(gain),
+        feedforward=variant.feedforward,
+        bias_force=scenario.adaptation.bias_force,
+        initial_gains=nominal_gains(design),
+        time_domain=Continuous(),
+    )
+
+
+def simulate_variants(
+    scenario: Scenario,
+    dynamics: RobotDynamics,
+    design: RSTDesign,
+    motion: HeartMotion,
+    *,
+    variants: Sequence[Variant],
+    progress: Progress | None = None,
+) -> Mapping[str, Trajectory]:
+    """Run every variant from rest on the heart; one engine serves all, parameters differ."""
+    linearisation = build_linearisation(
+        dynamics,
+        velocity_gain=scenario.design.velocity_gain,
+        tool_axis_bandwidth=scenario.design.tool_axis_bandwidth,
+        model_error=scenario.model_error,
+    )
+    inputs = exogenous_inputs(scenario, dynamics, motion)
+    engine: Engine | None = None
+    trajectories = {}
+    for number, variant in enumerate(variants):
+        step = build_step(variant_controller(scenario, design, variant))
+        axes = len(dynamics.description.force_axes)
+        loop = build_force_loop(
+            dynamics, linearisation, [step] * axes, stiffness=scenario.stiffness
+        )
+        engine = engine or build_engine(loop.system, RK4, input_powers=inputs.degree + 1)
+        share = None if progress is None else _share(progress, number, len(variants))
+        trajectories[variant.name] = _simulate(scenario, loop, engine, inputs, share)
+    return trajectories
+
+
+def exogenous_inputs(
+    scenario: Scenario, dynamics: RobotDynamics, motion: HeartMotion
+) -> PiecewisePolynomial:
+    """Heart position (m) and force reference (N), k channels each, over the whole run.
+
+    The heart lies where the spring carries the first reference when the tip is at home, so the
+    run starts in equilibrium but for the heart's velocity.
+    """
+    duration = scenario.simulation.duration
+    axes = dynamics.description.task.position
+    reference = scenario.reference.piecewise(duration)
+    displacement = motion.displacement.restricted(0.0, duration).selected(axes)
+    tip = home_task_position(dynamics)[: len(axes)]
+    start = displacement(0.0)[:, 0]
+    rest = tip - reference(0.0)[:, 0] / scenario.stiffness
+    return stack(displacement.shifted(rest - start), reference)
+
+
+def _simulate(
+    scenario: Scenario,
+    loop: ForceLoop,
+    engine: Engine,
+    inputs: PiecewisePolynomial,
+    progress: Progress | None,
+) -> Trajectory:
+    axes = len(loop.controllers)
+    choice = scenario.simulation
+    initial = resting_state(
+        loop,
+        posture=loop.dynamics.description.home,
+        force=inputs(0.0)[axes:, 0],
+        condition_limit=choice.condition_limit,
+    )
+    recording = run(
+        engine,
+        loop.system,
+        inputs=inputs,
+        parameters=loop.parameter_values,
+        initial_state=initial,
+        settings=RunSettings(
+            duration=choice.duration, step=choice.step, record_period=choice.record_period
+        ),
+        progress=progress,
+    )
+    return force_loop_trajectory(loop, recording, engine=engine.name)
+
+
+def _check_axes(scenario: Scenario, robot: RobotDescription) -> None:
+    wanted, given = len(robot.force_axes), len(scenario.reference.steps)
+    if wanted != given:
+        raise ScenarioFileError(
+            scenario.name,
+            "reference",
+            f"{given} axes given, but {robot.name} controls force on {', '.join(robot.force_axes)}",
+        )
+
+
+def _worst_condition(
+    scenario: Scenario, dynamics: RobotDynamics, trajectories: Mapping[str, Trajectory]
+) -> float:
+    # The posture moves by millimetres; a hundredth of the samples shows its condition.
+    postures = np.vstack([run_["joint_position"][::100] for run_ in trajectories.values()])
+    worst = float(condition_numbers(dynamics, postures).max())
+    if worst > scenario.simulation.condition_limit:
+        _LOG.warning(
+            "the task Jacobian's condition number reached %.3g (limit %.3g): the run came near a "
+            "singular posture, its linearisation is not to be trusted",
+            worst,
+            scenario.simulation.condition_limit,
+        )
+    return worst
+
+
+def _share(progress: Progress, number: int, count: int) -> Progress:
+    return lambda fraction: progress((number + fraction) / count)
