@@ -1,0 +1,5 @@
+"""Design, certify, simulate and deploy model reference adaptive force control.
+
+robot, motion → plant → design → stability → controller → simulation → metrics → study → export,
+report, workbench. Import from the subpackages; `mrac_design.study.run_study` runs the whole line.
+"""

@@ -73,23 +73,18 @@ class IllConditionedError(MracDesignError):
     """Floating arithmetic cannot solve a Diophantine equation well enough."""
 
     def __init__(
-        self,
-        *,
-        residual: float,
-        limit: float,
-        coprimeness: float,
-        closest_roots: Sequence[complex],
+        self, *, residual: float, limit: float, cancellation: float, coprimeness: float
     ) -> None:
         self.residual = residual
         self.limit = limit
+        self.cancellation = cancellation
         self.coprimeness = coprimeness
-        self.closest_roots = tuple(closest_roots)
-        roots = ", ".join(_root(root) for root in self.closest_roots)
         super().__init__(
-            f"the residual of A R + B S = Ac is {residual:.2g} of Ac, more than {limit:.2g}: "
-            f"float64 coefficients of R and S cannot place these poles (A and B come closest at the roots "
-            f"{roots or 'of A'}; smallest singular value {coprimeness:.2g}); move the wanted poles "
-            "nearer to the plant's, or design over the rationals"
+            f"the residual of A R + B S = Ac is {residual:.2g} of Ac, more than {limit:.2g}: A R "
+            f"and B S are up to {cancellation:.2g} times Ac and cancel, so rounding R and S to "
+            f"float64 already costs {cancellation * 1.1e-16:.2g} (the smallest singular value of "
+            f"A and B is {coprimeness:.2g}, 0 means a common root); move the wanted poles nearer "
+            "to the plant's, allow a larger residual, or design over the rationals"
         )
 
 

@@ -16,19 +16,20 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass
+from typing import Any
 
 import casadi as ca
 import numpy as np
 
 from mrac_design.arrays import FloatArray, readonly
-from mrac_design.controller.adaptation import AdaptationLaw
+from mrac_design.controller.adaptation import AdaptationLaw, AdaptationSignals
 from mrac_design.controller.advance import integral_advance, linear_advance
 from mrac_design.controller.reference import ReferenceFeedforward
 from mrac_design.controller.step import ControllerStep
 from mrac_design.design import ReferenceModel, RSTDesign
 from mrac_design.errors import ParameterError
 from mrac_design.layout import Layout
-from mrac_design.time_domain import TimeDomain
+from mrac_design.time_domain import Discrete, TimeDomain
 
 GAIN_NAMES = ("r1'", "s0", "s1", "t0", "t1", "bias")
 """Entries of the gain vector, in order; r1' = r1 − ao is what adapts [AW 5.71]."""
@@ -59,8 +60,8 @@ class AdaptiveRST:
 
     design: RSTDesign
     """The nominal design: plant, reference model, observer pole, R, S, T."""
-    prefilter: ReferenceModel
-    """Pre-filter Hm that turns force steps into the desired force F_d [Z 5]."""
+    prefilter: ReferenceModel | None
+    """Pre-filter Hm that turns force steps into the desired force F_d [Z 5]; none: F_d = r."""
     law: AdaptationLaw
     """How the gains move; a gain of zero freezes them."""
     feedforward: ReferenceFeedforward
@@ -98,13 +99,20 @@ def build_step(controller: AdaptiveRST) -> ControllerStep:
 
     reference_signal = _reference_path(state, symbols, reference)
     coarse = _filtered_signals(state, symbols, force, reference_signal.input)
-    command = -ca.dot(symbols["scaling"] * state["gains"], coarse)
+    law = controller.law
+    gains = law.confined(symbols, state["gains"])
+    command = -ca.dot(symbols["scaling"] * gains, coarse)
 
     regressor = symbols["b0"] * symbols["scaling"] * _regressor(state, symbols)
     command_over_p1 = state["filtered_command"][1] + symbols["ao"] * state["filtered_command"][2]
-    augmentation = -(symbols["b0"] * command_over_p1 + ca.dot(regressor, state["gains"]))
+    augmentation = -(symbols["b0"] * command_over_p1 + ca.dot(regressor, gains))
     error = force - state["model"][1] + augmentation
-    rate = controller.law.rate(symbols, regressor, error, symbols["bandwidth"])
+    rate = law.rate(
+        symbols,
+        AdaptationSignals(
+            gains=gains, regressor=regressor, error=error, bandwidth=symbols["bandwidth"]
+        ),
+    )
 
     following = _STATE.join(
         {
@@ -113,7 +121,7 @@ def build_step(controller: AdaptiveRST) -> ControllerStep:
             "filtered_reference": _filter(
                 symbols, state["filtered_reference"], reference_signal.input
             ),
-            "gains": integral_advance(controller.time_domain, state["gains"], rate),
+            "gains": _advanced_gains(controller, symbols, state["gains"], rate),
             "model": _second_order_step(symbols, "model", state["model"], reference_signal.input),
             "prefilter": _second_order_step(symbols, "prefilter", state["prefilter"], reference),
         }
@@ -123,7 +131,7 @@ def build_step(controller: AdaptiveRST) -> ControllerStep:
             "desired_force": reference_signal.desired,
             "model_force": state["model"][1],
             "augmented_error": error,
-            "adapted_gains": state["gains"],
+            "adapted_gains": gains,
         }
     )
     names = ["state", "force", "reference"]
@@ -146,23 +154,26 @@ def build_step(controller: AdaptiveRST) -> ControllerStep:
     )
 
 
+def _advanced_gains(
+    controller: AdaptiveRST, symbols: Mapping[str, ca.SX], gains: ca.SX, rate: ca.SX
+) -> ca.SX:
+    advanced = integral_advance(controller.time_domain, gains, rate)
+    if isinstance(controller.time_domain, Discrete):  # a whole period may step over a border
+        return controller.law.confined(symbols, advanced)
+    return advanced
+
+
 def _parameter_values(controller: AdaptiveRST) -> Mapping[str, FloatArray]:
     specification = controller.design.specification
-    model, prefilter, ao = (
-        specification.reference_model,
-        controller.prefilter,
-        specification.observer_pole,
-    )
+    model, ao = specification.reference_model, specification.observer_pole
     domain = controller.time_domain
     filter_A, filter_B = linear_advance(domain, *_regressor_filter(model, ao))
     model_A, model_B = linear_advance(domain, *_second_order(model))
-    prefilter_A, prefilter_B = linear_advance(domain, *_second_order(prefilter))
     c1, c2 = controller.feedforward.weights(model)
     # The bias enters like a constant that has passed 1/(Ao Am): its scaled regressor is a force.
     bias_scale = ao * model.bandwidth**2 / specification.plant.b0 * controller.bias_force
     values = {
         "bandwidth": model.bandwidth,
-        "model_damping": 2 * model.damping * model.bandwidth,
         "ao": ao,
         "b0": specification.plant.b0,
         "scaling": np.append(controller.design.scaling, bias_scale),
@@ -170,15 +181,21 @@ def _parameter_values(controller: AdaptiveRST) -> Mapping[str, FloatArray]:
         "filter_B": filter_B,
         "model_A": model_A,
         "model_B": model_B,
-        "prefilter_A": prefilter_A,
-        "prefilter_B": prefilter_B,
-        "prefilter_bandwidth": prefilter.bandwidth,
-        "prefilter_damping": prefilter.damping,
         "feedforward": [c1, c2],
         "initial_gains": [*controller.initial_gains, 0.0],
-        **controller.law.parameters(),
+        **_prefilter_values(controller.prefilter, domain),
+        **controller.law.parameters(len(GAIN_NAMES)),
     }
     return {name: readonly(np.ravel(value)) for name, value in values.items()}
+
+
+def _prefilter_values(prefilter: ReferenceModel | None, domain: TimeDomain) -> Mapping[str, Any]:
+    names = ("prefilter_A", "prefilter_B", "prefilter_bandwidth", "prefilter_damping")
+    if prefilter is None:  # its states stay at rest and the reference passes by
+        return dict(zip(names, (np.zeros((2, 2)), np.zeros(2), 0, 0), strict=True)) | {"direct": 1}
+    A, B = linear_advance(domain, *_second_order(prefilter))
+    values = (A, B, prefilter.bandwidth, prefilter.damping)
+    return dict(zip(names, values, strict=True)) | {"direct": 0}
 
 
 def _regressor_filter(model: ReferenceModel, ao: float) -> tuple[FloatArray, FloatArray]:
@@ -205,7 +222,8 @@ class _ReferenceSignal:
 def _reference_path(
     state: Mapping[str, ca.SX], symbols: Mapping[str, ca.SX], reference: ca.SX
 ) -> _ReferenceSignal:
-    rate, desired = state["prefilter"][0], state["prefilter"][1]
+    rate = state["prefilter"][0]
+    desired = state["prefilter"][1] + symbols["direct"] * reference
     bandwidth, damping = symbols["prefilter_bandwidth"], symbols["prefilter_damping"]
     acceleration = bandwidth * (bandwidth * (reference - desired) - 2 * damping * rate)
     c1, c2 = symbols["feedforward"][0], symbols["feedforward"][1]
@@ -256,7 +274,7 @@ def _equilibrium(parameters: Layout, symbols: Mapping[str, ca.SX], p: ca.SX) -> 
             "filtered_reference": settled,
             "gains": symbols["initial_gains"],
             "model": ca.vertcat(0, force),
-            "prefilter": ca.vertcat(0, force),
+            "prefilter": ca.vertcat(0, (1 - symbols["direct"]) * force),
         }
     )
     return ca.Function("equilibrium", [force, p], [state], ["force", "parameters"], ["state"])

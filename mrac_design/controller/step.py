@@ -9,6 +9,8 @@ import casadi as ca
 from mrac_design.arrays import FloatArray
 from mrac_design.layout import Layout
 
+_NO_EVENTS = Layout(())
+
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class ControllerStep:
@@ -21,6 +23,8 @@ class ControllerStep:
         advance(state, force, reference, applied_command, parameters)   -> next, signals
 
     `next` is the state's time derivative in continuous time and its next value in discrete time.
+    A controller that measures more than the force, heartbeats for instance, lists it as `events`:
+    `advance` then takes a sixth argument of that size.
     """
 
     state: Layout
@@ -34,6 +38,8 @@ class ControllerStep:
     command: ca.Function
     """(state, force N, reference N, parameters) -> command (m/s²)."""
     advance: ca.Function
-    """(state, force N, reference N, applied_command m/s², parameters) -> next, signals."""
+    """(state, force N, reference N, applied_command m/s², parameters[, events]) -> next, signals."""
     equilibrium: ca.Function
     """(force N, parameters) -> the state at rest at that force and reference."""
+    events: Layout = _NO_EVENTS
+    """Names of what it measures beside the force; empty for a pure force controller."""

@@ -105,6 +105,9 @@ class PolePlacement:
     shaping: fmpq_poly = field(init=False)
     """Bm' = Bm/B⁻."""
 
+    equation: DiophantineEquation = field(init=False)
+    """A Rf X + B⁻ Sf Y = Ao Am."""
+
     def __post_init__(self) -> None:
         if self.pole_excess < 0:
             raise ParameterError("controller pole excess", self.pole_excess, "must be ≥ 0")
@@ -127,6 +130,11 @@ class PolePlacement:
         shaping = self.tracking.shaping(self.Am, self.split.kept, normal.domain.static_point)
         object.__setattr__(self, "shaping", shaping)
         self._check_degrees()
+        # A prescribed factor that meets a pole or zero of the process is refused here.
+        equation = DiophantineEquation(
+            A=normal.A * self.fixed_R, B=self.split.kept * self.fixed_S, C=self.Ao * self.Am
+        )
+        object.__setattr__(self, "equation", equation)
 
     def _check_degrees(self) -> None:
         excess = self.pole_excess
@@ -163,18 +171,6 @@ class PolePlacement:
     def closed_loop(self) -> fmpq_poly:
         """The wanted A R + B S = Ao Am B⁺, monic."""
         return self.Ao * self.Am * self.split.cancelled
-
-    @property
-    def equation(self) -> DiophantineEquation:
-        """A Rf X + B⁻ Sf Y = Ao Am.
-
-        Raises NotCoprimeError when a prescribed factor meets a pole or zero of the process.
-        """
-        return DiophantineEquation(
-            A=self.process.A * self.fixed_R,
-            B=self.split.kept * self.fixed_S,
-            C=self.Ao * self.Am,
-        )
 
     def controller(self, X: fmpq_poly, Y: fmpq_poly) -> tuple[fmpq_poly, fmpq_poly, fmpq_poly]:
         """R, S and T for a solution of the equation."""

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from flint import fmpq_poly
@@ -16,6 +16,7 @@ from mrac_design.errors import CancellationError, IllConditionedError
 from mrac_design.polynomials.diophantine import (
     RESIDUAL_LIMIT,
     SylvesterSystem,
+    cancellation,
     relative_residual,
     require_coprime,
     solve_diophantine,
@@ -116,28 +117,38 @@ def place_poles(
     solution = solve_diophantine(
         SylvesterSystem.of(specification.equation), residual_limit=residual_limit
     )
-    controller = specification.controller(
-        binary_polynomial(solution.X), binary_polynomial(solution.Y)
+    R, S, T = specification.controller(binary_polynomial(solution.X), binary_polynomial(solution.Y))
+    unchecked = PolynomialDesign(
+        specification=specification,
+        R=coefficients(R),
+        S=coefficients(S),
+        T=coefficients(T),
+        residual=solution.residual,
+        coprimeness=solution.coprimeness,
+        condition=solution.condition,
     )
-    R, S, T = (coefficients(part) for part in controller)
-    whole = specification.process
-    residual = relative_residual(whole.A, whole.B, specification.closed_loop, R, S)
+    return rounded_design(unchecked, R=R, S=S, residual_limit=residual_limit)
+
+
+def rounded_design(
+    design: PolynomialDesign, *, R: fmpq_poly, S: fmpq_poly, residual_limit: float
+) -> PolynomialDesign:
+    """`design` with R and S rounded to float64 and its residual evaluated at them.
+
+    Raises IllConditionedError when the residual exceeds `residual_limit`.
+    """
+    floating_R, floating_S = coefficients(R), coefficients(S)
+    specification = design.specification
+    problem = (specification.process.A, specification.process.B, specification.closed_loop)
+    residual = relative_residual(*problem, floating_R, floating_S)
     if not residual <= residual_limit:
         raise IllConditionedError(
             residual=residual,
             limit=residual_limit,
-            coprimeness=solution.coprimeness,
-            closest_roots=[complex(root) for root in roots(specification.split.cancelled)],
+            cancellation=cancellation(*problem, floating_R, floating_S),
+            coprimeness=design.coprimeness,
         )
-    return PolynomialDesign(
-        specification=specification,
-        R=R,
-        S=S,
-        T=T,
-        residual=residual,
-        coprimeness=solution.coprimeness,
-        condition=solution.condition,
-    )
+    return replace(design, R=floating_R, S=floating_S, residual=residual)
 
 
 def place_poles_exact(specification: PolePlacement) -> ExactPolynomialDesign:

@@ -44,7 +44,7 @@ def find_beats(position: FloatArray, *, frame_rate: float, training: int) -> Bea
     typical = _typical_interval(position[:training], frame_rate)
     spline = CubicSpline(np.arange(position.shape[0]) / frame_rate, position)
     length = WINDOW * typical
-    ages = np.linspace(0.0, length, int(round(2.0 * length * frame_rate)) + 1)
+    ages = np.linspace(0.0, length, round(2.0 * length * frame_rate) + 1)
     end = (position.shape[0] - 1) / frame_rate - length
     coarse = np.arange(0.0, end, 0.5 / frame_rate)
     windows = spline(np.add.outer(coarse, ages))
@@ -86,7 +86,7 @@ def _chain(
     scale = float(np.mean((template - template.mean(axis=0)) ** 2))
     price = np.mean((windows - template) ** 2, axis=(1, 2)) / scale - REWARD
     step = starts[1] - starts[0]
-    near, far = int(round(SHORTEST * typical / step)), int(round(LONGEST * typical / step))
+    near, far = round(SHORTEST * typical / step), round(LONGEST * typical / step)
     # penalty[j] belongs to an interval of far − j steps.
     intervals = step * np.arange(far, near - 1, -1)
     penalty = PENALTY * ((intervals / typical - 1.0) / SPREAD) ** 2

@@ -21,7 +21,7 @@ from mrac_design.motion.rhythm import Rhythm, cardiac_phase, correlated_scores
 from mrac_design.motion.signal import quintic_hermite
 
 NODE_SPACING = 0.005
-"""Largest distance of the nodes of a generated motion, s: the quintic error stays under 1 nm
+"""Distance of the nodes of a generated motion, s: the quintic error stays under 1 nm
 for motion of a few mm up to 10 Hz, and the segments stay longer than an integrator's step."""
 
 
@@ -146,7 +146,10 @@ class DualFourierModel:
         """
         if not (np.isfinite(duration) and duration > 0.0):
             raise ParameterError("duration", duration, "must be a positive time in s")
-        nodes = np.linspace(0.0, duration, int(np.ceil(duration / NODE_SPACING)) + 1)
+        # Multiples of the spacing coincide with sampling instants; the last segment is 0.5 to
+        # 1.5 spacings long.
+        count = max(1, round(duration / NODE_SPACING))
+        nodes = np.append(np.arange(count) * NODE_SPACING, duration)
         jet = self.displacement(nodes)
         return centred_motion(
             name=self.name,

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from itertools import pairwise
 
 import numpy as np
 from scipy.interpolate import CubicSpline
@@ -105,7 +106,7 @@ def _statistics(motion: HeartMotion) -> MotionStatistics:
     frequency = np.fft.rfftfreq(count, 1.0 / 200.0)
     bands = [
         np.sqrt(power[:, (frequency >= low) & (frequency < high)].sum(axis=1))
-        for low, high in zip(BANDS[:-1], BANDS[1:], strict=True)
+        for low, high in pairwise(BANDS)
     ]
     return MotionStatistics(
         peak_to_peak=motion.peak_to_peak,

@@ -18,9 +18,9 @@ RESPIRATORY_HARMONICS = 3
 """Harmonics of the breath."""
 MODULATION_HARMONICS = 1
 """Harmonics of the breath that multiply those of the beat."""
-VARIATION_HARMONICS = 6
+VARIATION_HARMONICS = 8
 """Harmonics of the beat whose coefficients vary from beat to beat."""
-VARIATION_MODES = 5
+VARIATION_MODES = 8
 """Independent ways in which they vary."""
 RIDGE = 1e-3
 """Weight of the coefficients' squares beside the mean square residual."""
@@ -45,7 +45,9 @@ class Recording:
         position = readonly(self.position, (-1, 3))
         if not 1 < self.training < position.shape[0]:
             raise ParameterError(
-                "training", self.training, f"must leave some of {position.shape[0]} frames for judging"
+                "training",
+                self.training,
+                f"must leave some of {position.shape[0]} frames for judging",
             )
         mean = position[: self.training].mean(axis=0)
         object.__setattr__(self, "position", readonly(position - mean))
@@ -77,9 +79,7 @@ def beat_phase(t: FloatArray, onsets: FloatArray, *, period: float, systole: flo
             onsets[-1] + period * np.arange(1, after + 1),
         )
     )
-    return cardiac_phase(
-        t - extended[0], np.diff(extended), mean_period=period, systole=systole
-    )
+    return cardiac_phase(t - extended[0], np.diff(extended), mean_period=period, systole=systole)
 
 
 def series_basis(cardiac: Jet, respiratory: Jet) -> FloatArray:

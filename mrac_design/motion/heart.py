@@ -92,7 +92,9 @@ class HeartMotion:
                 "|---|---|---|---|",
                 *rows,
                 "",
-                *(f"- assumed: {item}" for item in self.assumptions),
+                "Assumed or chosen:",
+                "",
+                *(f"- {item}" for item in self.assumptions),
             ]
         )
 

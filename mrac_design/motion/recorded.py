@@ -11,6 +11,7 @@ from scipy.signal import butter, filtfilt
 from mrac_design.arrays import FloatArray
 from mrac_design.errors import MotionFileError, ParameterError
 from mrac_design.motion.heart import HeartMotion, Origin, centred_motion
+from mrac_design.motion.model_file import available_motions
 from mrac_design.motion.signal import from_ppoly
 from mrac_design.motion.track_file import read_track
 
@@ -38,6 +39,10 @@ def read_recorded_motion(
     outside 0 … frame_rate / 2.
     """
     file = Path(path)
+    if not file.suffix and not file.exists():
+        raise MotionFileError(
+            file, "", f"no such file, nor a packaged motion ({', '.join(available_motions())})"
+        )
     if not (np.isfinite(frame_rate) and frame_rate > 0.0):
         raise MotionFileError(
             file, "frame rate", f"{frame_rate} Hz: must be a positive number of frames a second"

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from math import comb
 from typing import TYPE_CHECKING
@@ -142,6 +143,12 @@ class PiecewisePolynomial:
         tolerance = _tolerance(np.array([start, end]), self.breakpoints)
         inside = (self.breakpoints > start + tolerance) & (self.breakpoints < end - tolerance)
         return self.on_breakpoints(np.concatenate(([start], self.breakpoints[inside], [end])))
+
+    def selected(self, channels: Sequence[int]) -> PiecewisePolynomial:
+        """The given channels only, in that order."""
+        return PiecewisePolynomial(
+            breakpoints=self.breakpoints, coefficients=self.coefficients[list(channels)]
+        )
 
     def shifted(self, offset: ArrayLike) -> PiecewisePolynomial:
         """The function plus a constant `offset` (channels,)."""

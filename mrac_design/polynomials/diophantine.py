@@ -90,22 +90,29 @@ class SylvesterSystem:
     equation: DiophantineEquation
     """The polynomial equation these are."""
 
-    matrix: FloatArray
-    """Sylvester matrix (N, N), N = deg X + deg Y + 2; row i belongs to power N − 1 − i, the
-    columns to the coefficients of X, then of Y, highest power first."""
-
-    right_side: FloatArray
-    """Coefficients of C, highest power first, (N,)."""
+    sylvester: SylvesterMatrix
+    """The coefficients, scaled and equilibrated."""
 
     @staticmethod
     def of(equation: DiophantineEquation) -> SylvesterSystem:
         """The equations of the solution of minimal degree, deg Y < deg A."""
-        sylvester = SylvesterMatrix.of(equation.A, equation.B, equation.degree_X, equation.degree_Y)
         return SylvesterSystem(
             equation=equation,
-            matrix=sylvester.unscaled(),
-            right_side=coefficients(equation.C, sylvester.size),
+            sylvester=SylvesterMatrix.of(
+                equation.A, equation.B, equation.degree_X, equation.degree_Y
+            ),
         )
+
+    @property
+    def matrix(self) -> FloatArray:
+        """Sylvester matrix (N, N), N = deg X + deg Y + 2; row i belongs to power N − 1 − i, the
+        columns to the coefficients of X, then of Y, highest power first."""
+        return self.sylvester.unscaled()
+
+    @property
+    def right_side(self) -> FloatArray:
+        """Coefficients of C, highest power first, (N,)."""
+        return coefficients(self.equation.C, self.sylvester.size)
 
     def _repr_latex_(self) -> str:
         rows = " \\\\ ".join(" & ".join(f"{value:.6g}" for value in row) for row in self.matrix)
@@ -182,8 +189,7 @@ def solve_diophantine(
     Raises NotCoprimeError when the data cannot be told from data with a common root, and
     IllConditionedError when no float64 X, Y were found that meet `residual_limit`.
     """
-    equation = system.equation
-    sylvester = SylvesterMatrix.of(equation.A, equation.B, equation.degree_X, equation.degree_Y)
+    equation, sylvester = system.equation, system.sylvester
     condition = sylvester.condition
     if not condition < COPRIME_LIMIT:
         raise NotCoprimeError(closest_roots(equation.A, equation.B))
@@ -193,8 +199,8 @@ def solve_diophantine(
         raise IllConditionedError(
             residual=residual,
             limit=residual_limit,
+            cancellation=cancellation(equation.A, equation.B, equation.C, X, Y),
             coprimeness=separation,
-            closest_roots=closest_roots(equation.A, equation.B),
         )
     return DiophantineSolution(
         equation=equation,
@@ -221,12 +227,28 @@ def relative_residual(
     A: fmpq_poly, B: fmpq_poly, C: fmpq_poly, X: FloatArray, Y: FloatArray
 ) -> float:
     """Residual of floating X and Y as `DiophantineSolution.residual` defines it."""
-    return _relative(C, C - A * binary_polynomial(X) - B * binary_polynomial(Y))
+    remainder = C - A * binary_polynomial(X) - B * binary_polynomial(Y)
+    return _relative(remainder, _majorant(C))
 
 
-def _relative(C: fmpq_poly, remainder: fmpq_poly) -> float:
-    length = max(C.degree(), remainder.degree()) + 1
-    size = coefficients(_majorant(C), length)
+def cancellation(A: fmpq_poly, B: fmpq_poly, C: fmpq_poly, X: FloatArray, Y: FloatArray) -> float:
+    """Largest coefficient of |A||X| + |B||Y| relative to that of C, at least about 1.
+
+    Rounding X and Y to float64 alone makes a residual of about 1e-16 times this.
+    """
+    sizes = _absolute(A) * binary_polynomial(np.abs(X)) + _absolute(B) * binary_polynomial(
+        np.abs(Y)
+    )
+    return _relative(sizes, _majorant(C))
+
+
+def _absolute(polynomial: fmpq_poly) -> fmpq_poly:
+    return fmpq_poly([abs(value) for value in polynomial.coeffs()])
+
+
+def _relative(remainder: fmpq_poly, majorant: fmpq_poly) -> float:
+    length = max(majorant.degree(), remainder.degree()) + 1
+    size = coefficients(majorant, length)
     error = np.abs(coefficients(remainder, length))
     # Above C's own degree there is nothing to be relative to: any error there is total.
     ratio = np.divide(error, size, out=np.where(error > 0.0, np.inf, 0.0), where=size > 0.0)
@@ -253,10 +275,11 @@ def _refine(
     """Iterative refinement with the residual taken in exact arithmetic."""
     vector = sylvester.solve(coefficients(equation.C, sylvester.size))
     best = (*sylvester.split(vector), np.inf)
+    majorant = _majorant(equation.C)
     for _ in range(REFINEMENTS):
         X, Y = sylvester.split(vector)
         remainder = equation.remainder(binary_polynomial(X), binary_polynomial(Y))
-        residual = _relative(equation.C, remainder)
+        residual = _relative(remainder, majorant)
         if not residual < best[2]:
             break
         best = (X, Y, residual)

@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 from mrac_design.arrays import FloatArray
 from mrac_design.design import RSTDesign
 from mrac_design.plant import ForcePlant
+from mrac_design.polynomials.rationals import roots
 from mrac_design.report.style import (
     COLOURS,
     SERIES_COLOURS,
@@ -34,7 +35,7 @@ _BEAT = (0.8, 2.0)
 
 @styled()
 def pole_figure(design: RSTDesign) -> CaptionedFigure:
-    """Poles of plant, controller and closed loop (rad/s), and where a wrong stiffness moves them."""
+    """Poles (rad/s) of plant, controller and closed loop, and their paths when Ks is wrong."""
     low, high = STIFFNESS_RANGE
     figure = new_figure(
         3.4,
@@ -58,8 +59,8 @@ def draw_poles(ax: Axes, design: RSTDesign) -> None:
         ("controller", design.loop.R, "+", COLOURS["adaptive_inverse"]),
     )
     for label, polynomial, marker, colour in groups:
-        roots = np.array([complex(root) for root, _ in polynomial.complex_roots()])
-        ax.plot(roots.real, roots.imag, marker, color=colour, markersize=8, label=label, mew=1.6)
+        places = roots(polynomial)
+        ax.plot(places.real, places.imag, marker, color=colour, markersize=8, label=label, mew=1.6)
     poles = design.closed_loop_poles
     colour = COLOURS["adaptive"]
     ax.plot(poles.real, poles.imag, "x", color=colour, markersize=8, mew=1.8, label="closed loop")
@@ -145,32 +146,36 @@ def draw_heart_sensitivity(ax: Axes, design: RSTDesign) -> None:
 
 @styled()
 def realness_figure(factorisations: Sequence[Factorisation], bandwidth: float) -> CaptionedFigure:
-    """Re G1 along the imaginary axis for each splitting, scaled to its largest modulus (–).
+    """Phase of G1 along the imaginary axis for each splitting (°), and ω² Re G1 (scaled, –).
 
     `bandwidth` (rad/s) is the middle of the frequency range drawn.
     """
     figure = new_figure(
-        3.6,
-        "Real part of $G_1(j\\omega)$ over frequency. Left: scaled with the largest $|G_1|$ "
-        "drawn. Right: $\\omega^2\\,\\mathrm{Re}\\,G_1$, scaled alike; where it tends to zero or "
-        "below, $G_1$ of relative degree 1 is not strictly positive real. Dashed: not strictly "
-        "positive real.",
+        3.5,
+        "First factors $G_1(j\\omega)$. Left: phase; a strictly positive real function stays "
+        "inside the shaded band of ±90°. Right: $\\omega^2\\,\\mathrm{Re}\\,G_1$ over its largest "
+        "value, for those of relative degree 1 and more; at high frequency it must stay away "
+        "from zero. Dashed: not strictly positive real.",
     )
-    real, weighted = figure.subplots(1, 2)
-    omega = bandwidth * np.geomspace(1e-3, 1e3, 400)
+    phase, weighted = figure.subplots(1, 2)
+    omega = bandwidth * np.geomspace(1e-4, 1e3, 400)
     for row, colour in zip(factorisations, SERIES_COLOURS, strict=False):
-        value = row.first.transfer_function()(1j * omega)
+        system = row.first.transfer_function()
+        value = system(1j * omega)
         strict = row.strict.verdict is Verdict.PROVED
         style = {"color": colour, "linestyle": "-" if strict else (0, (4, 2))}
-        real.semilogx(omega, value.real / np.abs(value).max(), label=_first_factor(row), **style)
-        bent = omega**2 * value.real
-        weighted.semilogx(omega, bent / np.abs(bent).max(), **style)
-    for ax in (real, weighted):
-        ax.axhline(0, color=COLOURS["limit"], linewidth=0.8)
+        phase.semilogx(omega, np.degrees(np.angle(value)), label=_first_factor(row), **style)
+        if len(system.den[0][0]) > len(system.num[0][0]):
+            bent = omega**2 * value.real
+            weighted.semilogx(omega, bent / np.abs(bent).max(), **style)
+    phase.axhspan(-90, 90, color=COLOURS["adaptive_inverse"], alpha=0.08, linewidth=0)
+    phase.set_yticks(range(-180, 91, 45))
+    weighted.axhline(0, color=COLOURS["limit"], linewidth=0.8)
+    for ax in (phase, weighted):
         ax.set_xlabel("frequency (rad/s)")
-    real.set_ylabel("Re $G_1$, scaled (–)")
+    phase.set_ylabel("phase of $G_1$ (°)")
     weighted.set_ylabel("$\\omega^2$ Re $G_1$, scaled (–)")
-    legend_above(figure, real.get_legend_handles_labels()[0], columns=3)
+    legend_above(figure, phase.get_legend_handles_labels()[0], columns=3)
     return figure
 
 
@@ -198,4 +203,8 @@ def _frequencies(design: RSTDesign) -> FloatArray:
 
 
 def _first_factor(row: Factorisation) -> str:
-    return row.name.split(" · ")[0]
+    """G1 as Matplotlib sets it, from the splitting's name in plain letters."""
+    text = row.name.split(" · ")[0]
+    for plain, subscript in (("Ks", "K_s"), ("K2", "K_2"), ("Am", "A_m")):
+        text = text.replace(plain, subscript)
+    return f"${text}$"

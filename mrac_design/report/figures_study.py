@@ -114,8 +114,8 @@ def torque_figure(study: StudyRecord, variant: str = "adaptive") -> CaptionedFig
         line(ax, trajectory.time, torque, "adaptive", joints[i].name, linewidth=0.9)
         largest = float(np.max(np.abs(torque)))
         ax.set_title(
-            f"motor {i + 1}, {joints[i].name}: at most {largest:.3g} N·m, {largest / limits[i]:.1%} of the limit "
-            f"±{limits[i]:g} N·m",
+            f"motor {i + 1}, {joints[i].name}: at most {largest:.3g} N·m, "
+            f"{largest / limits[i]:.1%} of the limit ±{limits[i]:g} N·m",
             fontsize=8,
         )
         _mark_limit(ax, float(limits[i]))
@@ -133,7 +133,9 @@ def gains_figure(study: StudyRecord, variant: str = "adaptive") -> CaptionedFigu
         r"Adapted gains: change of $\hat\theta = D^{-1}\theta$ from its start. Controller: "
         f"{VARIANT_NAMES[variant]}.",
     )
-    axes = stacked_axes(figure, [rf"{name}  $\Delta\hat\theta$ (–)" for name in names], [1] * len(names))
+    axes = stacked_axes(
+        figure, [rf"{name}  $\Delta\hat\theta$ (–)" for name in names], [1] * len(names)
+    )
     lines = []
     for ax, name in zip(axes, names, strict=True):
         own = [i for i, label in enumerate(labels) if label.startswith(f"{name} ")]
@@ -224,5 +226,5 @@ def _dots(ax: Axes, names: Sequence[str], values: Sequence[float], variant: str)
     ax.margins(x=0.2, y=0.15)
     ax.set_xticks(np.arange(len(names)), names)
     positions = np.arange(len(names)) + 0.14 * (list(VARIANT_NAMES).index(variant) - 1)
-    style = {"color": COLOURS[variant], "label": VARIANT_NAMES[variant], "markersize": 6}
-    return ax.plot(positions, values, "o", **style)[0]
+    name, colour = VARIANT_NAMES[variant], COLOURS[variant]
+    return ax.plot(positions, values, "o", color=colour, label=name, markersize=6)[0]

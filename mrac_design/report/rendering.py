@@ -12,9 +12,9 @@ import typst
 from mrac_design.errors import NotebookError, RenderingError
 from mrac_design.report.composition import compose_markdown
 from mrac_design.report.execution import execute_notebook
-from mrac_design.report.publishing import publish_file, staging_folder
+from mrac_design.publishing import publish_file, staging_folder
 
-RenderingProgress = Callable[[str, float], None]
+ReportProgress = Callable[[str, float], None]
 """Called with what is being done and the fraction (0…1) of the rendering that is done."""
 
 _TEMPLATES = Path(__file__).parent / "templates"
@@ -37,7 +37,7 @@ def render_report(
     scenario: Path,
     html: Path,
     pdf: Path,
-    progress: RenderingProgress = ignore_progress,
+    progress: ReportProgress = ignore_progress,
 ) -> None:
     """Execute `notebooks` in order and write them as chapters of `html` and `pdf`.
 
@@ -67,7 +67,7 @@ def render_report(
 
 
 def _executed_markdown(
-    notebooks: Sequence[Path], scenario: Path, folder: Path, progress: RenderingProgress
+    notebooks: Sequence[Path], scenario: Path, folder: Path, progress: ReportProgress
 ) -> str:
     environment = {"MRAC_SCENARIO": str(scenario.absolute())}
     chapters = []

@@ -36,7 +36,7 @@ SERIES_COLOURS = ("#0072b2", "#d55e00", "#009e73", "#cc79a7", "#e69f00", "#56b4e
 WIDTH = 6.5
 """Width of a figure in inches: the text width of an A4 page."""
 
-STYLE = {
+STYLE: dict[Any, Any] = {
     "axes.edgecolor": "#5c6672",
     "axes.grid": True,
     "axes.labelsize": 8.5,
@@ -126,7 +126,7 @@ def thinned(
     if time.size <= points:
         return time, values
     edges = np.linspace(0, time.size, points // 2 + 1).astype(int)
-    chosen = set()
+    chosen: set[int] = set()
     for start, end in pairwise(edges):
         stretch = values[start:end]
         chosen.update((start + int(np.argmin(stretch)), start + int(np.argmax(stretch))))

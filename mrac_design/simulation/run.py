@@ -54,10 +54,12 @@ def run(
     parameters: FloatArray,
     initial_state: FloatArray,
     settings: RunSettings,
+    initial_held: FloatArray | None = None,
     progress: Progress | None = None,
 ) -> Recording:
     """Integrate `system` on `engine` from `initial_state` under `inputs`.
 
+    `initial_held` is the memory before the first update; without it the memory starts at zero.
     Raises SimulationError, naming the instant, when a recorded output is no longer finite.
     """
     schedule = build_schedule(
@@ -69,6 +71,8 @@ def run(
     )
     coefficients = np.ascontiguousarray(inputs.coefficients.transpose(1, 0, 2))
     state, held = np.array(initial_state, dtype=float), np.zeros(system.held.size)
+    if initial_held is not None:
+        held[:] = initial_held
     time = schedule.start[schedule.records]
     rows: list[FloatArray] = []
     edges = np.linspace(0, schedule.length.size, _CHUNKS + 1).astype(int)

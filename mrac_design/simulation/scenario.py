@@ -131,6 +131,10 @@ class Scenario:
     simulation: SimulationChoice
     """Run settings."""
 
+    def __post_init__(self) -> None:
+        if not 0 < self.stiffness < float("inf"):
+            raise ParameterError("stiffness", self.stiffness, "must be finite and > 0 N/m")
+
 
 def available_scenarios() -> tuple[str, ...]:
     """Names of the scenarios that come with the package, sorted."""
@@ -158,18 +162,20 @@ def load_scenario(name_or_path: str | Path) -> Scenario:
     )  # fmt: skip
     contact = root.table("contact")
     contact.only("stiffness")
-    return Scenario(
-        name=root.text("name"),
-        title=root.text("title"),
-        robot=_beside(path, root.text("robot")),
-        motion=_motion(root.table("motion")),
-        stiffness=contact.number("stiffness"),
-        design=_section(root.table("design"), DesignChoice),
-        prefilter=_section(root.table("prefilter"), ReferenceModel),
-        adaptation=_adaptation(root.table("adaptation")),
-        model_error=_section(root.table("model_error"), RobotModelError),
-        reference=_reference(root.table("reference")),
-        simulation=_section(root.table("simulation"), SimulationChoice),
+    return root.build(
+        lambda: Scenario(
+            name=root.text("name"),
+            title=root.text("title"),
+            robot=_beside(path, root.text("robot")),
+            motion=_motion(root.table("motion")),
+            stiffness=contact.number("stiffness"),
+            design=_section(root.table("design"), DesignChoice),
+            prefilter=_section(root.table("prefilter"), ReferenceModel),
+            adaptation=_adaptation(root.table("adaptation")),
+            model_error=_section(root.table("model_error"), RobotModelError),
+            reference=_reference(root.table("reference")),
+            simulation=_section(root.table("simulation"), SimulationChoice),
+        )
     )
 
 

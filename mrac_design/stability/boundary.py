@@ -137,7 +137,7 @@ def axis_poles(boundary: Boundary) -> tuple[tuple[float, int], ...]:
 
 
 def lowest_real_part(boundary: Boundary) -> Extremum:
-    """inf Re G over the boundary and its place, as floats for show (the sign is decided exactly)."""
+    """inf Re G over the boundary and its place, as floats for show; signs are decided exactly."""
     if boundary.real_part == 0:
         return Extremum(value=0.0, frequency=0.0)
     common = boundary.real_part.gcd(boundary.modulus)

@@ -39,6 +39,12 @@ from mrac_design.stability.rational_function import (
     rational_function,
     to_float,
 )
+from mrac_design.stability.witness import (
+    RealPartFactorisation,
+    StorageFunction,
+    real_part_factorisation,
+    storage_function,
+)
 from mrac_design.time_domain import Continuous, TimeDomain
 from mrac_design.verdict import Verdict
 
@@ -69,6 +75,8 @@ class PositiveRealness:
     """The conditions of the definition, one by one."""
     boundary: Boundary
     """The exact analysis behind the verdict."""
+    witness: StorageFunction | RealPartFactorisation | None
+    """Rational data that prove the verdict again when multiplied out; None when REFUTED."""
 
     @property
     def function(self) -> RationalFunction:
@@ -144,7 +152,14 @@ def _judged(kind: Kind, boundary: Boundary, conditions: tuple[Hypothesis, ...]) 
         worst_frequency=lowest.frequency,
         hypotheses=conditions,
         boundary=boundary,
+        witness=None if failed is not None else _witness(kind, boundary),
     )
+
+
+def _witness(kind: Kind, boundary: Boundary) -> StorageFunction | RealPartFactorisation:
+    if kind is Kind.POSITIVE_REAL:
+        return real_part_factorisation(boundary)
+    return storage_function(boundary)
 
 
 def _reason(kind: Kind, boundary: Boundary, lowest: Extremum) -> str:

@@ -162,4 +162,3 @@ def _ideal_actuation() -> Hypothesis:
         status=Status.ASSUMED,
         evidence="no saturation, no sampling, exact linearisation of the robot",
     )
-

@@ -8,6 +8,8 @@ Answers are a dict of the three kinds of positive realness.
 
 from __future__ import annotations
 
+import itertools
+
 from flint import acb, arb, ctx, fmpq, fmpq_poly
 
 PR, SPR, STRONG = "positive real", "strictly positive real", "strongly strictly positive real"
@@ -89,7 +91,7 @@ def _roots(p: fmpq_poly) -> list[tuple[acb, int]]:
 
 
 def _sign_on_axis(E: fmpq_poly) -> int:
-    """1, 0 or −1 as the even polynomial E(jω) is positive, touches zero or is negative somewhere."""
+    """1, 0 or −1 as the even E(jω) is positive, touches zero or is negative somewhere."""
     if E == 0:
         return 0
     in_w = fmpq_poly([c * (-1) ** k for k, c in enumerate(E.coeffs()[0::2])])
@@ -117,7 +119,7 @@ def _lowest_sign(p: fmpq_poly, low: arb, high: arb | None) -> int:
     )
     touched = len(inner) + sum(1 for end in ends if end is not None and p(end) == 0)
     marks = [low, *inner] + ([] if high is None else [high])
-    points = [((a + b) / 2).mid().fmpq() for a, b in zip(marks, marks[1:], strict=False)]
+    points = [((a + b) / 2).mid().fmpq() for a, b in itertools.pairwise(marks)]
     if high is None:
         points.append((marks[-1] + 1).mid().fmpq())
     if any(p(point) < 0 for point in points):

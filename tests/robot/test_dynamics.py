@@ -271,6 +271,13 @@ def test_functions_have_names(case: Case) -> None:
 def test_geometry_known_to_vanish_is_not_computed() -> None:
     """α = π/2 in a file has a cosine of 6e-17; it must not reach the expressions."""
     case = case_of("d2m2_set_a")
+    terms = case.dynamics.rigid_body_terms
+    constants = [
+        terms.instruction_constant(k)
+        for k in range(terms.n_instructions())
+        if terms.instruction_id(k) == ca.OP_CONST
+    ]
+    assert all(value == 0 or abs(value) > 1e-6 for value in constants)
     jacobian = case.dynamics.task_jacobian(ca.SX.sym("q", 5))
     zeros = {(i, j) for i in range(5) for j in range(5) if jacobian[i, j].is_zero()}
     # The vertical slide moves z alone; the vertical axes 2 and 3 do not move z.

@@ -140,5 +140,5 @@ def test_a_folder_and_binary_are_refused(tmp_path: Path) -> None:
     with pytest.raises(ModelFileError, match="name: is missing"):
         load_robot(path)
     path.write_text("joint = 3\n" + TEXT.split("[[joint]]")[0], "utf-8")
-    with pytest.raises(ModelFileError, match=re.escape("one [[joint]] table per joint")):
+    with pytest.raises(ModelFileError, match=re.escape("one or more [[joint]] tables")):
         load_robot(path)

@@ -1,4 +1,4 @@
-"""Random transfer functions that sit close to the borders between the kinds of positive realness."""
+"""Random transfer functions close to the borders between the kinds of positive realness."""
 
 from __future__ import annotations
 
@@ -76,8 +76,10 @@ def _nearly_all_pass(generator: random.Random) -> Pair:
     """(1 − S)/(1 + S) with |S| = 1 + δ on the whole axis."""
     pole = ONE
     for _ in range(generator.randint(1, 3)):
-        pole *= _rational(generator) + S if generator.random() < 0.5 else (
-            S * S + _rational(generator, 0.001) * S + _rational(generator)
+        pole *= (
+            _rational(generator) + S
+            if generator.random() < 0.5
+            else (S * S + _rational(generator, 0.001) * S + _rational(generator))
         )
     mirrored = fmpq_poly([c * (-1) ** k for k, c in enumerate(pole.coeffs())])
     gain = 1 + _margin(generator)
@@ -104,7 +106,9 @@ def _exact(value: float) -> fmpq:
 
 
 def _disc_root(generator: random.Random) -> fmpq_poly:
-    radius = fmpq(generator.choice((3, 9, 99, 999, 1000)), 1000 if generator.random() < 0.7 else 1024)
+    radius = fmpq(
+        generator.choice((3, 9, 99, 999, 1000)), 1000 if generator.random() < 0.7 else 1024
+    )
     if generator.random() < 0.4:
         return S + generator.choice((-1, 1)) * radius
     return S * S - 2 * radius * fmpq(generator.randint(-9, 9), 10) * S + radius * radius

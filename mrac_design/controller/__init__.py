@@ -1,0 +1,1 @@
+"""Force controllers: adaptation laws, the adaptive RST step and the linearising torque."""

@@ -1,0 +1,1 @@
+"""Closed loops in time: scenarios, hybrid systems, generated code and recorded trajectories."""
