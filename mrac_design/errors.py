@@ -150,10 +150,6 @@ class SimulationError(MracDesignError):
     """A simulation left the range of finite numbers."""
 
 
-class Cancelled(MracDesignError):
-    """The user interrupted a long run."""
-
-
 class NotebookError(FileError):
     """A notebook of the report cannot be read, or one of its cells failed."""
 

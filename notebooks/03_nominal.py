@@ -139,11 +139,12 @@ ratios = [adaptive[axis].rms_model_error_N / frozen[axis].rms_model_error_N for 
 lag = study.trajectories["adaptive"]
 model_lag = 100 * np.abs(lag["model_force"] - lag["desired_force"]).max(axis=0)
 model_lag /= [adaptive[axis].max_desired_force_N for axis in axes]
+share = "Most" if np.all(2 * model_lag > plain) else "Part"
 Markdown(
     f"""The paper's controller keeps the force within **{over_axes(plain, "%")}** of the largest
 desired force, axis by axis; so does, within {over_axes(still, "%")}, the *same controller without
-any adaptation*. Most of that error is not the heart's: the reference model lags behind the desired
-force by up to {over_axes(model_lag, "%")} at the steps, and both controllers follow the model.
+any adaptation*. {share} of that error is not the heart's: the reference model lags behind the
+desired force by up to {over_axes(model_lag, "%")} at the steps, and both controllers follow the model.
 
 What adaptation does is seen in the error to the model's output $y_m$: its rms is
 {over_axes(ratios, "")} times the frozen controller's. That gain becomes visible in the force only

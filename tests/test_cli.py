@@ -12,7 +12,7 @@ from mrac_design import cli
 from mrac_design.resources import models_directory
 
 
-@pytest.fixture()
+@pytest.fixture
 def mrac(monkeypatch, capfd):
     """Run `mrac` in this process; returns (exit status, standard output, standard error)."""
 

@@ -12,6 +12,7 @@ from dataclasses import dataclass
 
 import casadi as ca
 import numpy as np
+from numpy.typing import ArrayLike
 
 from mrac_design.arrays import FloatArray, readonly
 from mrac_design.errors import ParameterError
@@ -64,7 +65,7 @@ def build_linearisation(
     if not 0 < tool_axis_bandwidth < float("inf"):
         raise ParameterError("tool axis bandwidth", tool_axis_bandwidth, "must be > 0 rad/s")
     robot = dynamics.description
-    values = {
+    values: dict[str, ArrayLike] = {
         "inertia": scaled_parameters(robot, model_error.body_scale),
         "torque_scale": [model_error.first_joint_scale] + [1.0] * (robot.joint_count - 1),
         "velocity_gain": velocity_gain,

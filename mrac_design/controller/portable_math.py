@@ -43,9 +43,9 @@ _COSINE = (
 
 
 def sine_cosine(angle: ca.SX) -> tuple[ca.SX, ca.SX]:
-    """(sin, cos) of a scalar angle in rad, within one unit in the last place of double (–).
+    """(sin, cos) of a scalar angle in rad, wrong by at most 1.5 units in the last place (–).
 
-    Good for |angle| up to a million turns in double precision and 4 turns in float.
+    Measured in double up to a million turns; in float good for |angle| up to four turns.
     """
     quadrant = ca.floor(angle * (2 / math.pi) + 0.5)
     rest = angle

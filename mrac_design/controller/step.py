@@ -38,7 +38,8 @@ class ControllerStep:
     command: ca.Function
     """(state, force N, reference N, parameters) -> command (m/s²)."""
     advance: ca.Function
-    """(state, force N, reference N, applied_command m/s², parameters[, events]) -> next, signals."""
+    """(state, force N, reference N, applied_command m/s², parameters[, events]) -> next,
+    signals."""
     equilibrium: ca.Function
     """(force N, parameters) -> the state at rest at that force and reference."""
     events: Layout = _NO_EVENTS

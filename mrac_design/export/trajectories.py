@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
@@ -20,14 +21,11 @@ def write_trajectories(study: StudyRecord, directory: Path) -> None:
     with staging_folder(directory) as staging:
         staged = []
         for variant, trajectory in study.trajectories.items():
-            units = {name: signal.unit for name, signal in trajectory.signals.items()}
+            units = {"time": "s"} | {n: signal.unit for n, signal in trajectory.signals.items()}
+            arrays: dict[str, Any] = {n: s.values for n, s in trajectory.signals.items()}
+            arrays |= {"time": trajectory.time, "units": json.dumps(units)}
             file = staging / f"{variant}.npz"
-            np.savez_compressed(
-                file,
-                time=trajectory.time,
-                units=json.dumps({"time": "s", **units}),
-                **{name: signal.values for name, signal in trajectory.signals.items()},
-            )
+            np.savez_compressed(file, allow_pickle=False, **arrays)
             staged.append(file)
         values = staging / "values.json"
         text = json.dumps(study_values(study), indent=2, ensure_ascii=False)

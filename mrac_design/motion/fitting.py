@@ -6,6 +6,7 @@ Run as `python -m mrac_design.motion.fitting RECORDING.csv --out FILE`.
 from __future__ import annotations
 
 import logging
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Annotated
 
@@ -54,6 +55,26 @@ SEEDS = range(1, 21)
 """Seeds whose motions are compared with the recording."""
 
 
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class _Clock:
+    """Beats and breaths of a recording."""
+
+    onsets: FloatArray
+    """Beats found in all frames, s."""
+    training_onsets: FloatArray
+    """Those that start in the training frames, s."""
+    period: float
+    """Mean interval of the training beats, s."""
+    systole: float
+    """Start of a beat that keeps its length, s."""
+    breath: float
+    """Respiratory frequency, Hz."""
+
+    def phase(self, t: FloatArray, onsets: FloatArray) -> Jet:
+        """Cardiac phase at `t` (N,), s, if the beats start at `onsets`, s."""
+        return beat_phase(t, onsets, period=self.period, systole=self.systole)
+
+
 def fit_recording(
     recording: Recording, *, name: str, source: str, assumptions: tuple[str, ...], seed: int
 ) -> Fit:
@@ -61,44 +82,24 @@ def fit_recording(
 
     Beat times are measured in all frames, with a template from the training frames: the first
     residual tells how well the fitted shapes carry over to later beats, the others what is
-    left when the later beats' times are not measured.
+    left when the later beats' times are not measured. Raises ParameterError for a recording
+    that is too short or has too few beats.
     """
-    t, end = recording.time, recording.training_time
-    if end < SHORTEST_TRAINING:
-        raise ParameterError(
-            "training", f"{end:g} s", f"needs at least {SHORTEST_TRAINING:g} s of motion"
-        )
-    breath = breathing_frequency(recording)
-    respiratory = steady_phase(t, breath)
-    b, a = butter(3, FASTEST_BREATH / (0.5 * recording.frame_rate), "high")
-    beating = filtfilt(b, a, recording.position, axis=0)
-    found = find_beats(beating, frame_rate=recording.frame_rate, training=recording.training)
-    known = found.onsets[found.onsets < end]
-    if known.size < FEWEST_BEATS:
-        raise ParameterError(
-            "beats found", known.size, f"needs {FEWEST_BEATS} alike beats to fit; is it a heart?"
-        )
-    intervals = np.diff(known)
-    period = float(intervals.mean())
-    logger.info(
-        "%d beats, mean interval %.4f s, breath %.4f s", found.onsets.size, period, 1.0 / breath
-    )
-    systole = _best_systole(recording, found.onsets, period, respiratory)
-    phase = beat_phase(t, found.onsets, period=period, systole=systole)
+    t = recording.time
+    clock = _measure_clock(recording)
+    respiratory = steady_phase(t, clock.breath)
+    phase = clock.phase(t, clock.onsets)
     coefficients = fit_series(recording, phase, respiratory)
     fitted = series_values(coefficients, phase, respiratory)
-    rhythm = VariableRhythm(
-        mean_period=period,
-        deviation=float(intervals.std(ddof=1)),
-        correlation=lag_one_correlation(intervals),
-    )
+    coasting = clock.phase(t, clock.training_onsets)
+    rhythm = _rhythm(clock)
     training = slice(0, recording.training)
     variation = fit_variation(
         (recording.position - fitted)[training],
         t[training],
-        known,
-        beat_phase(t[training], found.onsets, period=period, systole=systole),
-        period,
+        clock.training_onsets,
+        clock.phase(t[training], clock.onsets),
+        clock.period,
     )
     model = DualFourierModel(
         name=name,
@@ -107,28 +108,65 @@ def fit_recording(
         assumptions=assumptions,
         coefficients=coefficients,
         rhythm=rhythm,
-        systole=systole,
-        breathing=Breathing(frequency=breath),
+        systole=clock.systole,
+        breathing=Breathing(frequency=clock.breath),
         variation=variation,
         seed=seed,
     )
-    coasting = beat_phase(t, known, period=period, systole=systole)
+    guessed = "measured in training frames, the mean interval afterwards"
     return Fit(
         model=model,
         rhythm=rhythm,
         variation=variation,
-        onsets=found.onsets,
+        onsets=clock.onsets,
         residuals=(
             residual_of(recording, fitted, "measured in all frames"),
-            residual_of(
-                recording,
-                series_values(coefficients, coasting, respiratory),
-                "measured in training frames, the mean interval afterwards",
-            ),
-            _one_period_residual(recording, respiratory, period),
+            residual_of(recording, series_values(coefficients, coasting, respiratory), guessed),
+            _one_period_residual(recording, respiratory, clock.period),
         ),
         recorded=recorded_statistics(recording),
         generated=generated_statistics(model, float(t[-1]), SEEDS),
+    )
+
+
+def _measure_clock(recording: Recording) -> _Clock:
+    """Breathing, beats and systole of `recording`."""
+    end = recording.training_time
+    if end < SHORTEST_TRAINING:
+        raise ParameterError(
+            "training", f"{end:g} s", f"needs at least {SHORTEST_TRAINING:g} s of motion"
+        )
+    breath = breathing_frequency(recording)
+    b, a = butter(3, FASTEST_BREATH / (0.5 * recording.frame_rate), "high")
+    beating = filtfilt(b, a, recording.position, axis=0)
+    found = find_beats(beating, frame_rate=recording.frame_rate, training=recording.training)
+    known = found.onsets[found.onsets < end]
+    if known.size < FEWEST_BEATS:
+        raise ParameterError(
+            "beats found", known.size, f"needs {FEWEST_BEATS} alike beats to fit; is it a heart?"
+        )
+    period = float(np.diff(known).mean())
+    logger.info(
+        "%d beats, mean interval %.4f s, breath %.4f s", found.onsets.size, period, 1.0 / breath
+    )
+    return _Clock(
+        onsets=found.onsets,
+        training_onsets=known,
+        period=period,
+        systole=_best_systole(
+            recording, found.onsets, period, steady_phase(recording.time, breath)
+        ),
+        breath=breath,
+    )
+
+
+def _rhythm(clock: _Clock) -> VariableRhythm:
+    """Statistics of the training beats' lengths."""
+    intervals = np.diff(clock.training_onsets)
+    return VariableRhythm(
+        mean_period=clock.period,
+        deviation=float(intervals.std(ddof=1)),
+        correlation=lag_one_correlation(intervals),
     )
 
 

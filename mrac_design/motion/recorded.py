@@ -1,18 +1,20 @@
-"""Heart motion from a recorded track of camera frames, CSV or MATLAB."""
+"""Heart motion from a recorded track of camera frames, CSV or MATLAB.
+
+SciPy is imported where it is used: loading its filters takes longer than generating a motion,
+and most runs read no recording.
+"""
 
 from __future__ import annotations
 
 from pathlib import Path
 
 import numpy as np
-from scipy.interpolate import CubicSpline
-from scipy.signal import butter, filtfilt
 
 from mrac_design.arrays import FloatArray
 from mrac_design.errors import MotionFileError, ParameterError
 from mrac_design.motion.heart import HeartMotion, Origin, centred_motion
 from mrac_design.motion.model_file import available_motions
-from mrac_design.motion.signal import from_ppoly
+from mrac_design.motion.signal import PiecewisePolynomial, from_ppoly
 from mrac_design.motion.track_file import read_track
 
 FILTER_ORDER = 4
@@ -49,23 +51,6 @@ def read_recorded_motion(
         )
     track = read_track(file, point=point, unit=unit)
     filtered = low_pass(track.position, frame_rate=frame_rate, cutoff=cutoff, path=file)
-    if not 0 <= start_frame < filtered.shape[0] - 1:
-        raise MotionFileError(
-            file, "start frame", f"{start_frame}: the track has frames 0 … {filtered.shape[0] - 1}"
-        )
-    used = filtered[start_frame:]
-    available = (used.shape[0] - 1) / frame_rate
-    length = available if duration is None else duration
-    if not (np.isfinite(length) and length > 0.0):
-        raise ParameterError("duration", length, "must be a positive time in s")
-    if length > available * (1.0 + 1e-12):
-        raise MotionFileError(
-            file,
-            f"{used.shape[0]} frames",
-            f"last {available:.6g} s at {frame_rate:g} Hz, but {length:.6g} s are asked for: "
-            "shorten the duration or take a longer recording",
-        )
-    spline = from_ppoly(CubicSpline(np.arange(used.shape[0]) / frame_rate, used))
     return centred_motion(
         name=f"{file.stem} {point}",
         origin=Origin.RECORDED,
@@ -77,8 +62,35 @@ def read_recorded_motion(
             f"backwards, cut-off {cutoff:g} Hz.",
             f"Between frames a cubic spline: nothing above {frame_rate / 2:g} Hz was recorded.",
         ),
-        displacement=spline if length >= available else spline.restricted(0.0, length),
+        displacement=_spline(file, filtered, frame_rate, start_frame, duration),
     )
+
+
+def _spline(
+    path: Path, position: FloatArray, frame_rate: float, start: int, duration: float | None
+) -> PiecewisePolynomial:
+    """Cubic spline through the frames from `start` on, as long as asked for."""
+    from scipy.interpolate import CubicSpline
+
+    frames = position.shape[0]
+    if not 0 <= start < frames - 1:
+        raise MotionFileError(
+            path, "start frame", f"{start}: must be one of 0 … {frames - 2} of {frames} frames"
+        )
+    used = position[start:]
+    available = (used.shape[0] - 1) / frame_rate
+    length = available if duration is None else duration
+    if not (np.isfinite(length) and length > 0.0):
+        raise ParameterError("duration", length, "must be a positive time in s")
+    if length > available * (1.0 + 1e-12):
+        raise MotionFileError(
+            path,
+            f"{used.shape[0]} frames",
+            f"last {available:.6g} s at {frame_rate:g} Hz, but {length:.6g} s are asked for: "
+            "shorten the duration or take a longer recording",
+        )
+    spline = from_ppoly(CubicSpline(np.arange(used.shape[0]) / frame_rate, used))
+    return spline if length >= available else spline.restricted(0.0, length)
 
 
 def low_pass(position: FloatArray, *, frame_rate: float, cutoff: float, path: Path) -> FloatArray:
@@ -101,6 +113,8 @@ def low_pass(position: FloatArray, *, frame_rate: float, cutoff: float, path: Pa
             f"{position.shape[0]} frames",
             f"too short: the low-pass filter needs more than {padding}",
         )
+    from scipy.signal import butter, filtfilt
+
     b, a = butter(FILTER_ORDER, cutoff / nyquist)
     filtered: FloatArray = filtfilt(b, a, position, axis=0, padlen=padding)
     return filtered

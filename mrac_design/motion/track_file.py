@@ -9,7 +9,6 @@ from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
-from scipy.io import loadmat
 
 from mrac_design.arrays import FloatArray, readonly
 from mrac_design.errors import MotionFileError
@@ -102,6 +101,9 @@ def _read_csv(path: Path) -> _Table:
 
 def _read_mat(path: Path) -> _Table:
     """The vectors of a MATLAB file; other variables are left alone."""
+    # Most runs read no MATLAB file, and the import is slow.
+    from scipy.io import loadmat
+
     try:
         content = loadmat(path)
     # The reader fails in many ways on a damaged or newer file; all mean the same to a user.

@@ -23,7 +23,13 @@ from mrac_design.report.figures_study import (
 from mrac_design.report.provenance import scenario_provenance
 from mrac_design.report.rendering import render_report
 from mrac_design.report.saving import save_figures
-from mrac_design.report.tables import Quantity, Table, comparison_table, torque_table, tracking_table
+from mrac_design.report.tables import (
+    Quantity,
+    Table,
+    comparison_table,
+    torque_table,
+    tracking_table,
+)
 
 __all__ = [
     "Quantity",

@@ -37,9 +37,9 @@ def heart_motion_figure(study: StudyRecord) -> CaptionedFigure:
     displacement = MILLI * study.motion.displacement(time)[list(study.robot.task.position)]
     names = study.robot.force_axes
     figure = new_figure(
-        4.2,
-        f"Motion of the heart's surface ([Z] figure 5). Origin: {study.motion.origin.value}; "
-        f"{study.motion.source}.",
+        3.6,
+        "Motion of the heart's surface about its mean position ([Z] figure 5). Origin: "
+        f"{study.motion.origin.value}.",
     )
     axes = stacked_axes(figure, [f"{name} (mm)" for name in names], [1] * len(names))
     for ax, values in zip(axes, displacement, strict=True):
@@ -56,13 +56,15 @@ def force_figure(study: StudyRecord, axis: int) -> CaptionedFigure:
     """
     name = study.robot.force_axes[axis]
     figure = new_figure(
-        5.4,
-        f"Force on the {name} axis ([Z] figure {6 + axis}). Top: measured force over the "
-        "desired force $F_d$. Middle: error to the desired force. Bottom: error to the output "
-        "$y_m$ of the reference model, which is what adaptation works on.",
+        4.25,
+        f"Force on the {name} axis ([Z] figure {6 + axis}). Top: force and desired force $F_d$. "
+        "Middle: error to the desired force. Bottom: error to the output $y_m$ of the reference "
+        "model, which is what adaptation works on. Grey: the start, not judged.",
     )
     labels = [f"force {name} (N)", "$y - F_d$ (mN)", "$y - y_m$ (mN)"]
     force, error, model_error = stacked_axes(figure, labels, [1.3, 1, 1])
+    for ax in (force, error, model_error):
+        ax.axvspan(0, study.scenario.simulation.settling, color="#eef0f2", linewidth=0)
     drawn = []
     for variant, trajectory in study.trajectories.items():
         time, measured = trajectory.time, trajectory["force"][:, axis]
@@ -86,7 +88,7 @@ def compensation_figure(study: StudyRecord, variant: str = "adaptive") -> Captio
     """Figure 9 of [Z]: the robot's tip following the heart on each axis (mm)."""
     trajectory, names = study.trajectories[variant], study.robot.force_axes
     figure = new_figure(
-        5.0,
+        4.2,
         "Tip of the robot and surface of the heart ([Z] figure 9), counted from the heart's "
         "mean position; the distance between the lines is the contact spring's compression "
         f"$F/K_s$. Controller: {VARIANT_NAMES[variant]}.",
@@ -104,7 +106,7 @@ def torque_figure(study: StudyRecord, variant: str = "adaptive") -> CaptionedFig
     trajectory, limits = study.trajectories[variant], study.robot.motor_torque_limits
     joints = study.robot.joints
     figure = new_figure(
-        6.2,
+        5.6,
         f"Torque of each motor ([Z] figure 10), with its limit. Controller: "
         f"{VARIANT_NAMES[variant]}.",
     )
@@ -129,7 +131,7 @@ def gains_figure(study: StudyRecord, variant: str = "adaptive") -> CaptionedFigu
     labels = trajectory.signals["adapted_gains"].labels
     values = trajectory["adapted_gains"]
     figure = new_figure(
-        4.8,
+        4.2,
         r"Adapted gains: change of $\hat\theta = D^{-1}\theta$ from its start. Controller: "
         f"{VARIANT_NAMES[variant]}.",
     )

@@ -33,7 +33,7 @@ def _setting(study: StudyRecord) -> tuple[Quantity, ...]:
         Quantity(
             "robot parameters", study.robot.name, Origin.ASSUMED.value, "D2M2's are unpublished"
         ),
-        Quantity("heart motion", motion.name, motion.origin.value, motion.source),
+        Quantity("heart motion", motion.name, motion.origin.value, "source: see below"),
         *(
             Quantity("heart motion, assumption", "", Origin.ASSUMED.value, text)
             for text in motion.assumptions

@@ -10,9 +10,9 @@ import pypandoc
 import typst
 
 from mrac_design.errors import NotebookError, RenderingError
+from mrac_design.publishing import publish_file, staging_folder
 from mrac_design.report.composition import compose_markdown
 from mrac_design.report.execution import execute_notebook
-from mrac_design.publishing import publish_file, staging_folder
 
 ReportProgress = Callable[[str, float], None]
 """Called with what is being done and the fraction (0…1) of the rendering that is done."""

@@ -6,8 +6,8 @@ from collections.abc import Callable, Mapping
 from functools import partial
 from pathlib import Path
 
-from mrac_design.report import figures_study as draw
 from mrac_design.publishing import publish_folder, staging_folder
+from mrac_design.report import figures_study as draw
 from mrac_design.report.style import CaptionedFigure, styled
 from mrac_design.study import StudyRecord
 

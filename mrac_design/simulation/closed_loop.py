@@ -16,10 +16,16 @@ from numpy.typing import ArrayLike
 
 from mrac_design.arrays import FloatArray, readonly
 from mrac_design.controller.linearisation import Linearisation
+from mrac_design.controller.robot_step import saturated
 from mrac_design.controller.step import ControllerStep
 from mrac_design.errors import ParameterError
 from mrac_design.layout import Layout
-from mrac_design.robot import RobotDynamics, check_posture, inertial_parameters
+from mrac_design.robot import (
+    RobotDescription,
+    RobotDynamics,
+    check_posture,
+    inertial_parameters,
+)
 from mrac_design.simulation.system import ARGUMENT_NAMES, HybridSystem
 
 
@@ -50,13 +56,10 @@ def build_force_loop(
     """
     robot = dynamics.description
     axes, n = robot.force_axes, robot.joint_count
-    springs = np.broadcast_to(np.asarray(stiffness, dtype=float), (len(axes),))
-    if not np.all((springs > 0) & np.isfinite(springs)):
-        raise ParameterError("stiffness", springs, "must be finite and > 0 N/m")
     values = {
         "inertia": inertial_parameters(robot),
         "effort_limit": robot.effort_limits,
-        "stiffness": springs,
+        "stiffness": contact_stiffness(robot, stiffness),
         "linearisation": linearisation.parameter_values,
         **{f"controller_{a}": c.parameter_values for a, c in zip(axes, controllers, strict=True)},
     }
@@ -107,10 +110,8 @@ def _system(
         signals.append(step.signals.split(signal))
     command = ca.vertcat(*commands)
     wanted = linearisation.torque(q, qd, force, command, symbols["linearisation"])
-    limit = symbols["effort_limit"]
-    effort = ca.fmax(ca.fmin(wanted, limit), -limit)
-    J = dynamics.task_jacobian(q)
-    qdd = dynamics.forward_dynamics(q, qd, effort - J[:k, :].T @ force, symbols["inertia"])
+    effort = saturated(wanted, symbols["effort_limit"])
+    qdd = contact_acceleration(dynamics, q, qd, effort, force, symbols["inertia"])
     rate = ca.vertcat(qd, qdd, *following)
 
     recorded = {
@@ -137,6 +138,26 @@ def _system(
             "output", arguments, [outputs.join(recorded)], list(ARGUMENT_NAMES), ["output"]
         ),
     )
+
+
+def contact_stiffness(robot: RobotDescription, stiffness: ArrayLike) -> FloatArray:
+    """True spring stiffness of each force axis (N/m, one given or one per axis), shape (k,).
+
+    Raises ParameterError unless all are finite and positive.
+    """
+    springs = np.broadcast_to(np.asarray(stiffness, dtype=float), (len(robot.force_axes),))
+    if not np.all((springs > 0) & np.isfinite(springs)):
+        raise ParameterError("stiffness", springs, "must be finite and > 0 N/m")
+    return readonly(springs)
+
+
+def contact_acceleration(
+    dynamics: RobotDynamics, q: ca.SX, qd: ca.SX, effort: ca.SX, force: ca.SX, inertia: ca.SX
+) -> ca.SX:
+    """Joint accelerations (n,) under joint efforts and the contact force (N) on the tip [Z 1]."""
+    J = dynamics.task_jacobian(q)
+    contact = J[: len(dynamics.description.force_axes), :].T @ force
+    return dynamics.forward_dynamics(q, qd, effort - contact, inertia)
 
 
 def resting_state(

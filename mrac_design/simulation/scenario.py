@@ -5,6 +5,7 @@ from __future__ import annotations
 import os
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
+from functools import partial
 from pathlib import Path
 from typing import TypeVar
 
@@ -246,7 +247,7 @@ def _reference(table: Table) -> ForceReference:
         own = table.table(axis)
         own.only("times", "levels")
         times, levels = own.numbers("times"), own.numbers("levels")
-        steps.append(own.build(lambda t=times, y=levels: StepSequence(times=t, levels=y)))
+        steps.append(own.build(partial(StepSequence, times=tuple(times), levels=tuple(levels))))
     return ForceReference(steps=tuple(steps))
 
 

@@ -25,7 +25,7 @@ def signal(values, labels, unit):
     return SimpleNamespace(values=values, labels=tuple(labels), unit=unit, description="")
 
 
-def fake_trajectory(error_scale, model_scale, moving, samples=8001):
+def fake_trajectory(error_scale, model_scale, moving, samples=2001):
     time = np.linspace(0, 8, samples)
     phase = 2 * np.pi * np.outer(time, [0.83, 0.83, 0.83]) + [0, 1, 2]
     heart = np.array([0.5, -0.03, -0.3]) + 1e-3 * np.sin(phase) * [2.3, 0.9, 1.5]
@@ -74,6 +74,7 @@ def fake_study():
     joints = tuple(SimpleNamespace(name=f"joint {i + 1}") for i in range(5))
     heart = trajectories["frozen"]["heart"]
     return SimpleNamespace(
+        scenario=SimpleNamespace(simulation=SimpleNamespace(settling=0.5)),
         robot=SimpleNamespace(
             name="D2M2 stand-in",
             force_axes=AXES,
@@ -89,6 +90,6 @@ def fake_study():
         trajectories=trajectories,
         tracking=tracking,
         max_torque={
-            variant: {f"motor {i + 1}": 10.0 / (i + 1) for i in range(5)} for variant in tracking
+            variant: {f"joint {i + 1}": 10.0 / (i + 1) for i in range(5)} for variant in tracking
         },
     )

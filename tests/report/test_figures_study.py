@@ -44,7 +44,16 @@ def test_torque_figure_draws_a_limit_only_when_it_is_in_sight(study):
     assert len(draw.torque_figure(study).axes[4].lines) == 2
 
 
-def test_pictures_replace_an_older_folder_whole(study, tmp_path):
+@pytest.fixture
+def two_pictures(monkeypatch):
+    names = ("errors", "gains")
+    monkeypatch.setattr(
+        "mrac_design.report.saving.study_figures",
+        lambda study: {name: study_figures(study)[name] for name in names},
+    )
+
+
+def test_pictures_replace_an_older_folder_whole(study, tmp_path, two_pictures):
     target = tmp_path / "new" / "figures"
     target.mkdir(parents=True)
     (target / "stale.png").touch()
@@ -54,11 +63,11 @@ def test_pictures_replace_an_older_folder_whole(study, tmp_path):
     assert [path.name for path in target.parent.iterdir()] == ["figures"]
 
 
-def test_failing_picture_leaves_the_older_folder(study, tmp_path, monkeypatch):
+def test_failing_picture_leaves_the_older_folder(study, tmp_path, two_pictures):
     (tmp_path / "figures").mkdir()
     (tmp_path / "figures" / "older.png").touch()
     broken = fake_study()
-    broken.tracking = None
-    with pytest.raises(AttributeError):
+    broken.trajectories = {}  # read by the second picture only
+    with pytest.raises(KeyError):
         save_figures(broken, tmp_path / "figures")
     assert [path.name for path in tmp_path.rglob("*")] == ["figures", "older.png"]

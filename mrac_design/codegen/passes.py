@@ -1,0 +1,90 @@
+"""Optimisations of straight-line programs."""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Collection
+
+import casadi as ca
+
+from mrac_design.codegen.straight_line import CONSTANT, INPUT, Builder, StraightLine
+
+
+def share_reciprocals(program: StraightLine, *, settled: Collection[str] = ()) -> StraightLine:
+    """Quotients by the same divisor as products with its reciprocal, made once.
+
+    So are quotients by what depends on the inputs `settled` alone, whose reciprocal
+    `hoist_settled` then moves out of the loop. Changes results in the last place.
+    """
+    constant = _settled_positions(program, settled)
+    uses = Counter(node.arguments[1] for node in program.nodes if node.operation == ca.OP_DIV)
+    builder = Builder()
+    inputs = [builder.input(name, length) for name, length in program.inputs]
+    place: list[int] = []
+    for operation, arguments, value in program.nodes:
+        if operation == INPUT:
+            place.append(inputs[arguments[0]][arguments[1]])
+        elif operation == CONSTANT:
+            place.append(builder.constant(value))
+        elif operation == ca.OP_DIV and (uses[arguments[1]] > 1 or arguments[1] in constant):
+            reciprocal = builder.divide(builder.constant(1.0), place[arguments[1]])
+            place.append(builder.multiply(place[arguments[0]], reciprocal))
+        else:
+            place.append(builder.apply(operation, *(place[i] for i in arguments)))
+    return builder.finish({n: [place[i] for i in entries] for n, entries in program.outputs})
+
+
+def hoist_settled(
+    program: StraightLine, settled: Collection[str]
+) -> tuple[StraightLine, StraightLine]:
+    """Split off what depends on the inputs `settled` alone.
+
+    Returns (setup, body): setup computes the output `prepared` from the settled inputs, body is
+    the program with one more input, `prepared`.
+    """
+    constant = _settled_positions(program, settled)
+    kept = [i for i in range(len(program.nodes)) if i not in constant]
+    needed = {j for i in kept if program.nodes[i].operation != INPUT
+              for j in program.nodes[i].arguments}  # fmt: skip
+    needed |= {i for _, entries in program.outputs for i in entries}
+    moved = sorted(
+        i for i in needed & constant if program.nodes[i].operation not in (INPUT, CONSTANT)
+    )
+    setup = _copy(program, skip={}, prepared=0)
+    setup_places, setup_builder = setup
+    first = setup_builder.finish({"prepared": [setup_places[i] for i in moved]})
+    places, builder = _copy(program, skip={i: k for k, i in enumerate(moved)}, prepared=len(moved))
+    body = builder.finish({n: [places[i] for i in entries] for n, entries in program.outputs})
+    return first, body
+
+
+def _copy(
+    program: StraightLine, *, skip: dict[int, int], prepared: int
+) -> tuple[list[int], Builder]:
+    builder = Builder()
+    inputs = [builder.input(name, length) for name, length in program.inputs]
+    ready = builder.input("prepared", prepared) if skip or prepared else []
+    place: list[int] = []
+    for i, (operation, arguments, value) in enumerate(program.nodes):
+        if i in skip:
+            place.append(ready[skip[i]])
+        elif operation == INPUT:
+            place.append(inputs[arguments[0]][arguments[1]])
+        elif operation == CONSTANT:
+            place.append(builder.constant(value))
+        else:
+            place.append(builder.apply(operation, *(place[j] for j in arguments)))
+    return place, builder
+
+
+def _settled_positions(program: StraightLine, settled: Collection[str]) -> set[int]:
+    numbers = {i for i, (name, _) in enumerate(program.inputs) if name in settled}
+    positions: set[int] = set()
+    for i, (operation, arguments, _) in enumerate(program.nodes):
+        if operation == CONSTANT or (
+            arguments[0] in numbers
+            if operation == INPUT
+            else all(j in positions for j in arguments)
+        ):
+            positions.add(i)
+    return positions

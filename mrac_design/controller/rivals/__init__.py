@@ -1,0 +1,1 @@
+"""Force controllers of the literature, behind the same interface as the adaptive one."""

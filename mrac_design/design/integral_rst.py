@@ -1,0 +1,138 @@
+"""The RST controller with integrator: what fixed gains can do against a constant disturbance.
+
+R = p(p + r1) makes the disturbance sensitivity one order steeper at low frequency than the
+controller of degree one, for an observer polynomial of degree two.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+from flint import fmpq_poly
+from numpy.typing import NDArray
+
+from mrac_design.arrays import FloatArray
+from mrac_design.design.factors import integrator
+from mrac_design.design.loop import FeedbackLoop
+from mrac_design.design.margins import StabilityMargins
+from mrac_design.design.pole_placement import FollowModel, PolePlacement
+from mrac_design.design.polynomial_design import (
+    ExactPolynomialDesign,
+    PolynomialDesign,
+    place_poles,
+    place_poles_exact,
+)
+from mrac_design.design.reference_model import ReferenceModel
+from mrac_design.design.zeros import KeepZeros
+from mrac_design.errors import ParameterError
+from mrac_design.plant import ForcePlant
+from mrac_design.polynomials.rationals import decimal_rational
+from mrac_design.time_domain import Continuous
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class IntegralRSTSpecification:
+    """Force plant, reference model and Ao = p² + 2ξo ωo p + ωo².
+
+    Raises ParameterError when ωo or ξo is not positive and finite.
+    """
+
+    plant: ForcePlant
+    """Process with b0 = Ks, as the designer believes it to be."""
+
+    reference_model: ReferenceModel
+    """Wanted response ω²/Am from uc to the force."""
+
+    observer_bandwidth: float
+    """ωo, rad/s, positive."""
+
+    observer_damping: float
+    """ξo, dimensionless, positive."""
+
+    def __post_init__(self) -> None:
+        for name, value in (
+            ("observer bandwidth ωo", self.observer_bandwidth),
+            ("observer damping ξo", self.observer_damping),
+        ):
+            if not (math.isfinite(value) and value > 0.0):
+                raise ParameterError(name, value, "must be positive")
+
+    @property
+    def placement(self) -> PolePlacement:
+        """The same problem among those for any process, with p prescribed in R."""
+        Am = self.reference_model.exact_polynomial
+        omega = decimal_rational(self.observer_bandwidth)
+        xi = decimal_rational(self.observer_damping)
+        return PolePlacement(
+            process=self.plant.process,
+            Am=Am,
+            Ao=fmpq_poly([omega**2, 2 * xi * omega, 1]),
+            zeros=KeepZeros(),
+            tracking=FollowModel(Bm=fmpq_poly([Am[0]])),
+            fixed_R=integrator(Continuous()),
+        )
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class IntegralRSTDesign:
+    """R u = T uc − S y with R = p(p + r1), S = s0 p² + s1 p + s2, T = (ω²/b0) Ao."""
+
+    specification: IntegralRSTSpecification
+    """What was asked for."""
+
+    solved: PolynomialDesign
+    """The same controller as a solved pole placement."""
+
+    @property
+    def R(self) -> FloatArray:
+        """[1, r1, 0], highest power first."""
+        return self.solved.R
+
+    @property
+    def S(self) -> FloatArray:
+        """[s0, s1, s2], highest power first; m/(s²·N) times 1, 1/s, 1/s²."""
+        return self.solved.S
+
+    @property
+    def T(self) -> FloatArray:
+        """[t0, t1, t2], highest power first; units as S."""
+        return self.solved.T
+
+    @property
+    def residual(self) -> float:
+        """Largest coefficient of A R + b0 S − Ao Am relative to that of Ao Am."""
+        return self.solved.residual
+
+    @property
+    def loop(self) -> FeedbackLoop:
+        """The closed loop with the design plant; it has all sensitivities."""
+        return self.solved.loop
+
+    @property
+    def closed_loop_poles(self) -> NDArray[np.complex128]:
+        """Roots of A R + b0 S, (4,), rad/s."""
+        return self.loop.poles
+
+    def margins(self) -> StabilityMargins:
+        """Gain, phase, delay and modulus margin."""
+        return self.loop.margins()
+
+    def _repr_latex_(self) -> str:
+        return self.solved._repr_latex_()
+
+
+def design_integral_rst(specification: IntegralRSTSpecification) -> IntegralRSTDesign:
+    """RST controller with integrator in float64.
+
+    Raises IllConditionedError when the residual exceeds 1e-10 of Ao Am.
+    """
+    return IntegralRSTDesign(
+        specification=specification, solved=place_poles(specification.placement)
+    )
+
+
+def design_integral_rst_exact(specification: IntegralRSTSpecification) -> ExactPolynomialDesign:
+    """The same controller over the rationals."""
+    return place_poles_exact(specification.placement)

@@ -1,0 +1,227 @@
+"""The robot on the heart under a sampled controller, as one hybrid system.
+
+    at sampling instants   Fe + noise ─► sensor ─► robot step ─► pipeline of d samples ─┐
+                           q, q̇ ──────────────────────▲                                 │ hold
+    in between             robot and spring, continuous  ◄──────────────── Γ ───────────┘
+
+The controller is the very `RobotStep` that is exported; only the plant is integrated.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+import casadi as ca
+import numpy as np
+from numpy.typing import ArrayLike
+
+from mrac_design.arrays import FloatArray, readonly
+from mrac_design.controller.robot_step import RobotStep
+from mrac_design.errors import ParameterError
+from mrac_design.layout import Layout
+from mrac_design.robot import RobotDynamics, check_posture, inertial_parameters
+from mrac_design.simulation.closed_loop import (
+    ForceLoop,
+    contact_acceleration,
+    contact_stiffness,
+)
+from mrac_design.simulation.readout import force_loop_trajectory
+from mrac_design.simulation.run import Recording
+from mrac_design.simulation.sensor import ForceSensor
+from mrac_design.simulation.system import ARGUMENT_NAMES, HybridSystem
+from mrac_design.simulation.trajectory import Signal, Trajectory
+
+
+@dataclass(frozen=True, slots=True)
+class ComputationalDelay:
+    """Whole samples between a measurement and the instant its torque acts."""
+
+    samples: int
+    """Number of samples, ≥ 0; with 0 the torque acts at the instant of the measurement."""
+
+    def __post_init__(self) -> None:
+        if not (isinstance(self.samples, int) and self.samples >= 0):
+            raise ParameterError("delay", self.samples, "must be a whole number of samples ≥ 0")
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class SampledForceLoop:
+    """A closed loop around a sampled controller, ready to run."""
+
+    loop: ForceLoop
+    """The equations; inputs are heart position (m), force reference (N) and sensor noise (N),
+    k of each."""
+    step: RobotStep
+    """The controller inside."""
+
+
+def build_sampled_loop(
+    dynamics: RobotDynamics,
+    step: RobotStep,
+    *,
+    stiffness: ArrayLike,
+    delay: ComputationalDelay,
+    sensor: ForceSensor,
+) -> SampledForceLoop:
+    """Close the loop of the true robot `dynamics` over a two-sided spring of `stiffness` (N/m).
+
+    The torque is held between samples (zero-order hold). Raises ParameterError for a bad
+    stiffness or a controller made for other axes or joints than the robot's.
+    """
+    robot = dynamics.description
+    axes, n = len(robot.force_axes), robot.joint_count
+    if (robot.force_axes, n) != (step.robot.force_axes, step.robot.joint_count):
+        raise ParameterError(
+            "robot", robot.name, f"has other joints or force axes than {step.robot.name}"
+        )
+    values = {
+        "inertia": inertial_parameters(robot),
+        "stiffness": contact_stiffness(robot, stiffness),
+        "controller": step.parameter_values,
+        **sensor.parameters(),
+    }
+    parameters = Layout(tuple((name, int(np.size(value))) for name, value in values.items()))
+    held = Layout(
+        (
+            ("controller", step.state.size),
+            ("pipeline", n * (delay.samples + 1)),
+            *sensor.memory(axes).blocks,
+            *step.signals.blocks,
+        )
+    )
+    state = Layout((("joint_position", n), ("joint_velocity", n)))
+    inputs = Layout((("heart", axes), ("reference", axes), ("noise", axes)))
+    system = _system(dynamics, step, sensor, state, held, inputs, parameters)
+    loop = ForceLoop(
+        system=system,
+        parameter_values=parameters.pack(values),
+        dynamics=dynamics,
+        controllers=step.controllers,
+    )
+    return SampledForceLoop(loop=loop, step=step)
+
+
+def _system(
+    dynamics: RobotDynamics,
+    step: RobotStep,
+    sensor: ForceSensor,
+    state: Layout,
+    held: Layout,
+    inputs: Layout,
+    parameters: Layout,
+) -> HybridSystem:
+    n, axes = dynamics.description.joint_count, len(dynamics.description.force_axes)
+    arguments = [
+        state.symbols("state"),
+        held.symbols("held"),
+        inputs.symbols("input"),
+        parameters.symbols("parameters"),
+    ]
+    layouts = (state, held, inputs, parameters)
+    states, memory, exogenous, symbols = (
+        layout.split(vector) for layout, vector in zip(layouts, arguments, strict=True)
+    )
+    q, qd = states["joint_position"], states["joint_velocity"]
+    tip = dynamics.task_position(q)[:axes]
+    force = symbols["stiffness"] * (tip - exogenous["heart"])
+    reading = sensor.sample(memory, force, exogenous["noise"], symbols)
+    following, torque, signals = step.step(
+        memory["controller"],
+        q,
+        qd,
+        reading["measured_force"],
+        exogenous["reference"],
+        symbols["controller"],
+    )
+    # The newest torque enters at the front; the one that acts leaves at the back.
+    pipeline = ca.vertcat(torque, memory["pipeline"])[: memory["pipeline"].numel()]
+    effort = memory["pipeline"][-n:]
+    qdd = contact_acceleration(dynamics, q, qd, effort, force, symbols["inertia"])
+    recorded = {
+        "force": force,
+        "measured_force": memory["measured_force"],
+        "force_reference": exogenous["reference"],
+        "tip": tip,
+        "heart": exogenous["heart"],
+        "effort": effort,
+        "computed_effort": memory["pipeline"][:n],
+        "joint_position": q,
+        "joint_velocity": qd,
+        **{name: memory[name] for name, _ in step.signals.blocks},
+    }
+    update = {
+        "controller": following,
+        "pipeline": pipeline,
+        **reading,
+        **step.signals.split(signals),
+    }
+
+    def function(name: str, result: ca.SX, label: str) -> ca.Function:
+        return ca.Function(name, arguments, [result], list(ARGUMENT_NAMES), [label])
+
+    outputs = Layout(tuple((name, value.numel()) for name, value in recorded.items()))
+    return HybridSystem(
+        state=state,
+        held=held,
+        inputs=inputs,
+        parameters=parameters,
+        outputs=outputs,
+        rate=function("rate", ca.vertcat(qd, qdd), "rate"),
+        output=function("output", outputs.join(recorded), "output"),
+        update=function("update", held.join(update), "next_held"),
+        sampling_period=step.time_domain.period,
+    )
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class SampledStart:
+    """Where a sampled loop starts from."""
+
+    state: FloatArray
+    """Initial state of the robot, shape (state.size,)."""
+    held: FloatArray
+    """Memory before the first sample, shape (held.size,)."""
+
+
+def resting_start(
+    sampled: SampledForceLoop, *, posture: ArrayLike, force: ArrayLike, condition_limit: float
+) -> SampledStart:
+    """The loop at rest at a posture, the controller settled on its force (N, k values).
+
+    The torques still on their way are those that hold the robot at rest. Raises
+    SingularPostureError when the task Jacobian's condition number there exceeds
+    `condition_limit`.
+    """
+    loop, step = sampled.loop, sampled.step
+    check_posture(loop.dynamics, posture, condition_limit)
+    n = loop.dynamics.description.joint_count
+    still = np.zeros(n)
+    settled = step.resting_state(np.ravel(force))
+    _, torque, _ = step.step(settled, posture, still, force, force, step.parameter_values)
+    layout = loop.system.held
+    queue = layout.slices["pipeline"]
+    memory: Mapping[str, ArrayLike] = {
+        **{name: 0.0 for name, _ in layout.blocks},
+        "controller": settled,
+        "pipeline": np.tile(torque.full().ravel(), (queue.stop - queue.start) // n),
+    }
+    state = loop.system.state.pack({"joint_position": posture, "joint_velocity": still})
+    return SampledStart(state=readonly(state), held=layout.pack(memory))
+
+
+def sampled_trajectory(
+    sampled: SampledForceLoop, recording: Recording, *, engine: str
+) -> Trajectory:
+    """Signals of a recorded run: those of the continuous loop and what sampling adds to them."""
+    plain = force_loop_trajectory(sampled.loop, recording, engine=engine)
+    outputs = sampled.loop.system.outputs.split(np.asarray(recording.outputs))
+    axes = sampled.loop.dynamics.description.force_axes
+    added = {
+        "measured_force": ("N", "contact force as the sensor read it last"),
+        "applied_command": ("m/s²", "command that the limited torques carry out"),
+    }
+    signals = dict(plain.signals)
+    for name, (unit, text) in added.items():
+        signals[name] = Signal(values=outputs[name], unit=unit, labels=axes, description=text)
+    return Trajectory(time=plain.time, signals=signals, engine=engine)

@@ -1,0 +1,285 @@
+"""The search for certificates: solver, rounding, exact decision, and bisection of the box."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from math import ceil, floor, log10, sqrt
+
+from flint import fmpq
+
+from mrac_design.arrays import FloatArray
+from mrac_design.errors import ParameterError
+from mrac_design.polynomials.rationals import Number
+from mrac_design.stability.adaptive_loop import (
+    AdaptiveLoop,
+    ParameterBox,
+    Vertex,
+    exact,
+    relative_box,
+)
+from mrac_design.stability.certificate import (
+    StabilityCertificate,
+    Timing,
+    increment_of,
+    unstable_corner,
+    vertices_of,
+)
+from mrac_design.stability.claims import (
+    Claim,
+    DecayClaim,
+    EnergyClaim,
+    Output,
+    PeakClaim,
+    first_failure,
+)
+from mrac_design.stability.exact_matrix import rounded_symmetric
+from mrac_design.stability.inequalities import (
+    Corner,
+    Increment,
+    decay_blocks,
+    energy_blocks,
+    floating_corner,
+    peak_blocks,
+)
+from mrac_design.stability.semidefinite import Candidate, least_scalar, widest_margin
+from mrac_design.time_domain import Continuous
+from mrac_design.verdict import Verdict
+
+ROUNDING_BITS = 44
+"""Binary places a Lyapunov matrix keeps below its largest entry."""
+PEAK_RATES = (0.05, 0.1, 0.2, 0.3, 0.45, 0.6, 0.75, 0.9)
+"""Shares of the certified decay tried as the rate of the peak bound."""
+SLACKS = (1.002, 1.02, 1.2)
+"""Inflation of a solver's gain, tried in turn until the exact check passes."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class _Polytope:
+    """The corners in both arithmetics and how V changes along the loop."""
+
+    increment: Increment
+    vertices: tuple[Vertex, ...]
+    corners: tuple[Corner, ...]
+    size: int
+
+    def proved(self, claim: Claim) -> bool:
+        return first_failure(claim, self.increment, self.vertices) is None
+
+
+def certify(loop: AdaptiveLoop, box: ParameterBox, timing: Timing) -> StabilityCertificate:
+    """Stability, decay rate and gains of the adaptive loop over the box, as far as provable.
+
+    The verdict is PROVED when a rounded Lyapunov matrix passes the exact check at every corner,
+    REFUTED when the loop with gains frozen at a corner is unstable (continuous time), UNDECIDED
+    otherwise. Needs cvxpy and Clarabel.
+    """
+    polytope = _polytope(loop, box, timing)
+    decay = _fastest_decay(polytope)
+    if decay is None:
+        return _without_proof(loop, box, timing)
+    continuous = isinstance(timing, Continuous)
+    return StabilityCertificate(
+        loop=loop,
+        box=box,
+        timing=timing,
+        decay=decay,
+        energy=_least_energy_gain(polytope, Output.FORCE),
+        peak=_least_peak_gain(polytope, decay.rate),
+        mismatch=_least_energy_gain(polytope, Output.LINEARISED_COMMAND) if continuous else None,
+        verdict=Verdict.PROVED,
+        reason=(
+            "exponentially stable for every path of the gains in the box and of the stiffness "
+            f"in its range: {len(polytope.vertices)} corners decided in exact arithmetic"
+        ),
+    )
+
+
+def has_common_lyapunov_function(loop: AdaptiveLoop, box: ParameterBox, timing: Timing) -> bool:
+    """Whether a common quadratic Lyapunov function was found and proved; False proves nothing."""
+    return _decay_at(_polytope(loop, box, timing), 0.0) is not None
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class LargestBox:
+    """The largest relative box with a proved common Lyapunov function."""
+
+    fraction: fmpq
+    """Every gain may be within ± this share of nominal; 0 when not even the nominal is proved."""
+    proved: bool
+    """False when no certificate exists even for gains frozen at nominal."""
+    resolution: fmpq
+    """Width of the last bisection step."""
+
+
+def largest_box(
+    loop: AdaptiveLoop,
+    stiffness_range: tuple[Number, Number],
+    timing: Timing,
+    *,
+    resolution: Number,
+) -> LargestBox:
+    """Bisect the relative gain box, 0 to 1, for the largest that is proved.
+
+    Raises ParameterError for a resolution outside (0, 1).
+    """
+    width = exact(resolution, "resolution")
+    if not 0 < width < 1:
+        raise ParameterError("resolution", resolution, "must be between 0 and 1")
+    count = int((1 / width).floor())
+    low, high = -1, count
+    while high - low > 1:
+        middle = max(0, (low + high) // 2)
+        box = relative_box(loop, middle * width, stiffness_range)
+        if has_common_lyapunov_function(loop, box, timing):
+            low = middle
+        else:
+            high = middle
+    return LargestBox(fraction=max(low, 0) * width, proved=low >= 0, resolution=width)
+
+
+def _polytope(loop: AdaptiveLoop, box: ParameterBox, timing: Timing) -> _Polytope:
+    vertices = vertices_of(loop, box, timing)
+    # The solver sees each gain corner once; the bounds of the exponentials are 2⁻⁹⁵ apart.
+    distinct = vertices[: sum(1 for _ in box.corners())]
+    return _Polytope(
+        increment=increment_of(timing),
+        vertices=vertices,
+        corners=tuple(floating_corner(vertex) for vertex in distinct),
+        size=vertices[0].A.shape[0],
+    )
+
+
+def _without_proof(
+    loop: AdaptiveLoop, box: ParameterBox, timing: Timing
+) -> StabilityCertificate:
+    corner = unstable_corner(loop, box, timing)
+    reason = "no common quadratic Lyapunov function was found; make the box smaller"
+    verdict = Verdict.UNDECIDED
+    if corner is not None:
+        reason = f"the loop with gains frozen in a corner of the box is unstable: {corner}"
+        verdict = Verdict.REFUTED if isinstance(timing, Continuous) else Verdict.UNDECIDED
+    return StabilityCertificate(
+        loop=loop,
+        box=box,
+        timing=timing,
+        decay=None,
+        energy=None,
+        peak=None,
+        mismatch=None,
+        verdict=verdict,
+        reason=reason,
+    )
+
+
+def _fastest_decay(polytope: _Polytope) -> DecayClaim | None:
+    """The largest proved decay, to 3 % of itself; the rate keeps three significant digits."""
+    best = _decay_at(polytope, 0.0)
+    if best is None:
+        return None
+    low, high = 0.0, 2.0 if polytope.increment.__name__ == "derivative" else 1.0
+    for _ in range(8):
+        middle = (low + high) / 2
+        claim = _decay_at(polytope, middle)
+        if claim is None:
+            high = middle
+        else:
+            low, best = middle, claim
+    return best if best.rate > 0 else _decay_at(polytope, high / 16)
+
+
+def _decay_at(polytope: _Polytope, rate: float) -> DecayClaim | None:
+    def blocks(P: FloatArray, _: float) -> list[FloatArray]:
+        found = [P]
+        for corner in polytope.corners:
+            found += decay_blocks(polytope.increment, corner, P, rate)
+        return found
+
+    candidate = widest_margin(blocks, polytope.size)
+    if candidate is None:
+        return None
+    exact_rate = fmpq(*rate.as_integer_ratio()) if rate else fmpq(1, 10**6)
+    claim = DecayClaim(P=rounded_symmetric(candidate.P, ROUNDING_BITS), rate=exact_rate)
+    return claim if polytope.proved(claim) else None
+
+
+def _least_energy_gain(polytope: _Polytope, output: Output) -> EnergyClaim | None:
+    def blocks(P: FloatArray, squared: float) -> list[FloatArray]:
+        found = [P]
+        for corner in polytope.corners:
+            row = output.row(corner)
+            found += energy_blocks(polytope.increment, corner, P, row, squared)
+        return found
+
+    def claim(candidate: Candidate, gain: fmpq) -> EnergyClaim:
+        P = rounded_symmetric(candidate.P, ROUNDING_BITS)
+        return EnergyClaim(P=P, output=output, gain=gain)
+
+    result = _least_gain(polytope, blocks, claim)
+    return result if isinstance(result, EnergyClaim) else None
+
+
+def _least_peak_gain(polytope: _Polytope, decay: fmpq) -> PeakClaim | None:
+    """The smallest proved peak bound over a few rates of the invariant ellipsoid."""
+    fastest = int(decay.p) / int(decay.q)
+    rates = [fmpq(ceil(share * fastest * 10**6), 10**6) for share in PEAK_RATES]
+    bounds = [(_peak_candidate(polytope, rate), rate) for rate in rates]
+    ranked = sorted(
+        (found.scalar, rate) for found, rate in bounds if found is not None and found.scalar > 0
+    )
+    for _, rate in ranked:
+        result = _peak_at(polytope, rate)
+        if result is not None:
+            return result
+    return None
+
+
+def _peak_blocks(polytope: _Polytope, rate: fmpq) -> Callable[..., list[FloatArray]]:
+    floating = int(rate.p) / int(rate.q)
+
+    def blocks(P: FloatArray, squared: float) -> list[FloatArray]:
+        found = [P]
+        for corner in polytope.corners:
+            found += peak_blocks(polytope.increment, corner, P, floating, squared)
+        return found
+
+    return blocks
+
+
+def _peak_candidate(polytope: _Polytope, rate: fmpq) -> Candidate | None:
+    return least_scalar(_peak_blocks(polytope, rate), polytope.size)
+
+
+def _peak_at(polytope: _Polytope, rate: fmpq) -> PeakClaim | None:
+    def claim(candidate: Candidate, gain: fmpq) -> PeakClaim:
+        return PeakClaim(P=rounded_symmetric(candidate.P, ROUNDING_BITS), rate=rate, gain=gain)
+
+    result = _least_gain(polytope, _peak_blocks(polytope, rate), claim)
+    return result if isinstance(result, PeakClaim) else None
+
+
+def _least_gain(
+    polytope: _Polytope,
+    blocks: Callable[[FloatArray, float], Sequence[FloatArray]],
+    claim: Callable[[Candidate, fmpq], Claim],
+) -> Claim | None:
+    """Minimise a gain, step back from the optimum, and prove what is left."""
+    least = least_scalar(blocks, polytope.size)
+    if least is None or not least.scalar > 0:
+        return None
+    for slack in SLACKS:
+        gain = _rounded_up(sqrt(least.scalar) * slack)
+        squared = (int(gain.p) / int(gain.q)) ** 2
+        candidate = widest_margin(blocks, polytope.size, scalar=squared)
+        if candidate is not None:
+            found = claim(candidate, gain)
+            if polytope.proved(found):
+                return found
+    return None
+
+
+def _rounded_up(value: float) -> fmpq:
+    """`value` rounded up to four significant digits."""
+    unit = floor(log10(value)) - 3
+    return ceil(value / 10.0**unit) * fmpq(10) ** unit
+
