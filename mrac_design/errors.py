@@ -150,6 +150,14 @@ class SimulationError(MracDesignError):
     """A simulation left the range of finite numbers."""
 
 
+class CertificateError(MracDesignError):
+    """A stability certificate does not exist, or does not hold what it claims."""
+
+    def __init__(self, problem: str) -> None:
+        self.problem = problem
+        super().__init__(f"no certificate: {problem}")
+
+
 class NotebookError(FileError):
     """A notebook of the report cannot be read, or one of its cells failed."""
 

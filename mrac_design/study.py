@@ -5,13 +5,14 @@ from __future__ import annotations
 import logging
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from pathlib import Path
 
 import numpy as np
 
 from mrac_design.controller.adaptive import AdaptiveRST, build_step, nominal_gains
 from mrac_design.controller.linearisation import build_linearisation, home_task_position
 from mrac_design.controller.reference import DirectReference, ModelInverse, ReferenceFeedforward
-from mrac_design.design import RSTDesign, RSTSpecification, design_rst
+from mrac_design.design import ReferenceModel, RSTDesign, RSTSpecification, design_rst
 from mrac_design.errors import ScenarioFileError
 from mrac_design.metrics.tracking import TrackingMetrics, max_torque, tracking_metrics
 from mrac_design.motion import HeartMotion, available_motions, load_motion, read_recorded_motion
@@ -109,7 +110,7 @@ def run_study(scenario: Scenario, progress: Progress | None = None) -> StudyReco
 def scenario_motion(scenario: Scenario) -> HeartMotion:
     """The scenario's heart motion, long enough for its run."""
     choice = scenario.motion
-    if choice.source in available_motions():
+    if choice.source in available_motions() or Path(choice.source).suffix == ".toml":
         return load_motion(choice.source, duration=scenario.simulation.duration)
     return read_recorded_motion(
         choice.source,
@@ -123,8 +124,6 @@ def scenario_motion(scenario: Scenario) -> HeartMotion:
 def scenario_design(scenario: Scenario) -> RSTDesign:
     """The scenario's RST design."""
     choice = scenario.design
-    from mrac_design.design import ReferenceModel
-
     return design_rst(
         RSTSpecification(
             plant=ForcePlant(stiffness=choice.stiffness, velocity_gain=choice.velocity_gain),

@@ -144,6 +144,18 @@ class ErrorModel:
         common = numerator.gcd(denominator)
         return numerator // common, denominator // common
 
+    @property
+    def disturbance_transfer(self) -> tuple[fmpq_poly, fmpq_poly]:
+        """Numerator and denominator of Q A R/(P Ao Am B⁺), what an output disturbance adds to ef.
+
+        The stability arguments for adaptive laws leave this term out.
+        """
+        placement = self.design.specification
+        numerator = self.Q * placement.process.A * self.design.R
+        denominator = self.P * placement.closed_loop
+        common = numerator.gcd(denominator)
+        return numerator // common, denominator // common
+
     def transfer_function(self) -> control.TransferFunction:
         """G for python-control."""
         numerator, denominator = self.transfer

@@ -69,12 +69,14 @@ class RealType:
 
     def literal(self, value: float) -> str:
         """Shortest text that C reads back as `value` rounded to this type."""
-        if not np.isfinite(value):
-            return "NAN" if np.isnan(value) else ("INFINITY" if value > 0 else "-INFINITY")
-        text = np.format_float_scientific(self.dtype.type(value), trim="-", exp_digits=1)
+        with np.errstate(over="ignore"):
+            number = self.dtype.type(value)
+        if not np.isfinite(number):
+            return "NAN" if np.isnan(number) else ("INFINITY" if number > 0 else "-INFINITY")
+        text = np.format_float_scientific(number, trim="-", exp_digits=1)
         mantissa, exponent = text.split("e")
         if -5 < int(exponent) < 7:
-            text = np.format_float_positional(self.dtype.type(value), trim="0")
+            text = np.format_float_positional(number, trim="0")
         elif "." not in mantissa:
             text = f"{mantissa}.0e{exponent}"
         return text + self.suffix

@@ -33,9 +33,7 @@ def certificate_document(certificate: StabilityCertificate) -> dict[str, Any]:
 
     Raises CertificateError when the certificate is not proved or fails its own exact check.
     """
-    failure = (
-        certificate.verify() if certificate.verdict is Verdict.PROVED else certificate.reason
-    )
+    failure = certificate.verify() if certificate.verdict is Verdict.PROVED else certificate.reason
     if failure is not None:
         raise CertificateError(failure)
     loop, box = certificate.loop, certificate.box

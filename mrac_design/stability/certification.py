@@ -150,9 +150,7 @@ def _polytope(loop: AdaptiveLoop, box: ParameterBox, timing: Timing) -> _Polytop
     )
 
 
-def _without_proof(
-    loop: AdaptiveLoop, box: ParameterBox, timing: Timing
-) -> StabilityCertificate:
+def _without_proof(loop: AdaptiveLoop, box: ParameterBox, timing: Timing) -> StabilityCertificate:
     corner = unstable_corner(loop, box, timing)
     reason = "no common quadratic Lyapunov function was found; make the box smaller"
     verdict = Verdict.UNDECIDED
@@ -282,4 +280,3 @@ def _rounded_up(value: float) -> fmpq:
     """`value` rounded up to four significant digits."""
     unit = floor(log10(value)) - 3
     return ceil(value / 10.0**unit) * fmpq(10) ** unit
-

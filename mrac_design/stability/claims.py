@@ -84,9 +84,7 @@ class PeakClaim:
 Claim = DecayClaim | EnergyClaim | PeakClaim
 
 
-def first_failure(
-    claim: Claim, increment: Increment, vertices: Sequence[Vertex]
-) -> str | None:
+def first_failure(claim: Claim, increment: Increment, vertices: Sequence[Vertex]) -> str | None:
     """Why the claim is not proved by its numbers, in exact arithmetic; None when it is."""
     if not is_positive_definite(claim.P):
         return "P is not positive definite"

@@ -96,9 +96,7 @@ def hold_terms(a: fmpq, velocity_gain: fmpq, period: fmpq) -> tuple[fmpq, fmpq]:
     return p, (period - p) / velocity_gain
 
 
-def sampled_vertices(
-    loop: AdaptiveLoop, box: ParameterBox, timing: Sampling
-) -> tuple[Vertex, ...]:
+def sampled_vertices(loop: AdaptiveLoop, box: ParameterBox, timing: Sampling) -> tuple[Vertex, ...]:
     """Matrices of the sampled loop at every corner of box × exponential bounds.
 
     The state is (ŷ, Ẑ, x̂u, x̂y, û_{k−1}, …, û_{k−delay}).
@@ -163,9 +161,7 @@ def _sampled_vertex(
     energy = exact_array([*input_matrix.tolist(), *([[0, 0]] * (size - 2))])
     return Vertex(
         A=np.array(rows, dtype=object),
-        disturbances=tuple(
-            exact_array([[v] for v in (sign * q, p, *zero)]) for sign in (1, -1)
-        ),
+        disturbances=tuple(exact_array([[v] for v in (sign * q, p, *zero)]) for sign in (1, -1)),
         energy_input=energy,
         # Between samples the force is κ(ŷ + p(τ)Ẑ + q(τ)û), with q(τ) convex in p(τ).
         force=tuple(

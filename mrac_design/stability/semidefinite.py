@@ -6,6 +6,7 @@ answer of the solver can cost a certificate but cannot forge one.
 
 from __future__ import annotations
 
+import warnings
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
@@ -68,15 +69,16 @@ def _solved(problem: object) -> bool:
     import cvxpy as cp
 
     try:
-        problem.solve(solver=cp.CLARABEL)  # type: ignore[attr-defined]
+        with warnings.catch_warnings():
+            # An inaccurate answer is welcome: what it is worth is decided exactly later.
+            warnings.simplefilter("ignore", UserWarning)
+            problem.solve(solver=cp.CLARABEL)  # type: ignore[attr-defined]
     except cp.SolverError:
         return False
     return problem.status in (cp.OPTIMAL, cp.OPTIMAL_INACCURATE)  # type: ignore[attr-defined]
 
 
-def _coefficients(
-    blocks: Blocks, size: int
-) -> list[tuple[int, FloatArray, FloatArray]]:
+def _coefficients(blocks: Blocks, size: int) -> list[tuple[int, FloatArray, FloatArray]]:
     """(m, slopes (m², unknowns + 1), constant (m²,)) of every block, by evaluation on a basis."""
     zero = np.zeros((size, size))
     constant = [np.asarray(block, float) for block in blocks(zero, 0.0)]

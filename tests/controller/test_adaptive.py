@@ -8,7 +8,6 @@ from itertools import pairwise
 import control
 import numpy as np
 import pytest
-from oracles.adaptive_rst import AxisLoop
 from scipy.integrate import solve_ivp
 
 from mrac_design.controller.adaptation import GradientLaw, NormalisedGradientLaw
@@ -19,6 +18,7 @@ from mrac_design.design import ReferenceModel, RSTSpecification, design_rst
 from mrac_design.errors import ParameterError
 from mrac_design.plant import ForcePlant
 from mrac_design.time_domain import Continuous, Discrete
+from tests.oracles.adaptive_rst import AxisLoop
 
 PAPER = design_rst(
     RSTSpecification(

@@ -1,0 +1,144 @@
+"""Straight-line programs as C functions of numbers, or of lanes of numbers.
+
+The text works on a type `real`: a double, or a vector of doubles (an extension of gcc and clang)
+of which every lane goes the same way. `support` defines the type and what C has no operator for.
+"""
+
+from __future__ import annotations
+
+import casadi as ca
+
+from mrac_design.codegen.straight_line import CONSTANT, INPUT, StraightLine
+
+OPERATORS = {
+    ca.OP_ADD: "{0} + {1}",
+    ca.OP_SUB: "{0} - {1}",
+    ca.OP_MUL: "{0} * {1}",
+    ca.OP_DIV: "{0} / {1}",
+    ca.OP_NEG: "-{0}",
+    ca.OP_FMIN: "real_min({0}, {1})",
+    ca.OP_FMAX: "real_max({0}, {1})",
+    ca.OP_LT: "real_where({0} < {1})",
+    ca.OP_LE: "real_where({0} <= {1})",
+    ca.OP_EQ: "real_where({0} == {1})",
+    ca.OP_NE: "real_where({0} != {1})",
+    ca.OP_AND: "real_where(({0} != 0.0) & ({1} != 0.0))",
+    ca.OP_OR: "real_where(({0} != 0.0) | ({1} != 0.0))",
+    ca.OP_NOT: "real_where({0} == 0.0)",
+    ca.OP_IF_ELSE_ZERO: "real_if({0} != 0.0, {1})",
+    ca.OP_SIGN: "real_where({0} > 0.0) - real_where({0} < 0.0)",
+    ca.OP_FABS: "real_max({0}, -{0})",
+}
+_MIX = (ca.OP_ADD, ca.OP_SUB, ca.OP_MUL, ca.OP_DIV, ca.OP_NEG)
+"""Operators that take a vector and a number."""
+FUNCTIONS = {
+    ca.OP_SQRT: "sqrt", ca.OP_SIN: "sin", ca.OP_COS: "cos", ca.OP_TAN: "tan",
+    ca.OP_ASIN: "asin", ca.OP_ACOS: "acos", ca.OP_ATAN: "atan", ca.OP_SINH: "sinh",
+    ca.OP_COSH: "cosh", ca.OP_TANH: "tanh", ca.OP_EXP: "exp", ca.OP_LOG: "log",
+    ca.OP_FLOOR: "floor", ca.OP_CEIL: "ceil", ca.OP_EXPM1: "expm1", ca.OP_LOG1P: "log1p",
+    ca.OP_POW: "pow", ca.OP_ATAN2: "atan2", ca.OP_HYPOT: "hypot", ca.OP_FMOD: "fmod",
+    ca.OP_COPYSIGN: "copysign",
+}  # fmt: skip
+"""Operations left to the C mathematics library, by its names."""
+
+_SCALAR = """\
+typedef double real;
+#define splat(x) (x)
+#define real_where(condition) ((double)(condition))
+#define real_if(condition, a) ((condition) ? (a) : 0.0)
+#define real_any(condition) (condition)
+#define real_call1(function, a) function(a)
+#define real_call2(function, a, b) function(a, b)
+static inline double real_min(double a, double b) { return a < b ? a : b; }
+static inline double real_max(double a, double b) { return a > b ? a : b; }
+"""
+_VECTOR = """\
+typedef double real __attribute__((vector_size(LANES * sizeof(double))));
+typedef long long mask __attribute__((vector_size(LANES * sizeof(double))));
+#define splat(x) ((real){0.0} + (x))
+static inline real real_where(mask c) { return (real)(c & (mask)splat(1.0)); }
+static inline real real_if(mask c, real a) { return (real)(c & (mask)a); }
+static inline real real_min(real a, real b) {
+    const mask c = a < b;
+    return (real)((c & (mask)a) | (~c & (mask)b));
+}
+static inline real real_max(real a, real b) {
+    const mask c = a > b;
+    return (real)((c & (mask)a) | (~c & (mask)b));
+}
+static inline int real_any(mask c) {
+    long long any = 0;
+    for (int l = 0; l < LANES; ++l) any |= c[l];
+    return any != 0;
+}
+static inline real real_call1(double (*function)(double), real a) {
+    real r;
+    for (int l = 0; l < LANES; ++l) r[l] = function(a[l]);
+    return r;
+}
+static inline real real_call2(double (*function)(double, double), real a, real b) {
+    real r;
+    for (int l = 0; l < LANES; ++l) r[l] = function(a[l], b[l]);
+    return r;
+}
+"""
+
+
+def support(lanes: int) -> str:
+    """Definitions the functions need, for one number or `lanes` numbers at once."""
+    if lanes == 1:
+        return "enum { LANES = 1 };\n" + _SCALAR
+    return f"enum {{ LANES = {lanes} }};\n" + _VECTOR
+
+
+def c_routine(program: StraightLine, name: str) -> str:
+    """A static C function: one pointer per input, then one per output, in the program's order."""
+    pointers = [
+        *(f"const real *restrict {argument}" for argument, _ in program.inputs),
+        *(f"real *restrict {result}" for result, _ in program.outputs),
+    ]
+    names = [n for n, _ in (*program.inputs, *program.outputs)]
+    unused = " ".join(f"(void){n};" for n in names)
+    body = "\n".join(f"    {line}" for line in _statements(program))
+    return f"static void {name}({', '.join(pointers)})\n{{\n    {unused}\n{body}\n}}\n"
+
+
+def literal(value: float) -> str:
+    """A C constant of exactly this value."""
+    text = repr(float(value))
+    if text in ("inf", "-inf"):
+        return text.replace("inf", "INFINITY")
+    return text if any(mark in text for mark in ".en") else f"{text}.0"
+
+
+def _statements(program: StraightLine) -> list[str]:
+    lines = []
+    shown: list[str] = []
+    for i, (operation, arguments, value) in enumerate(program.nodes):
+        if operation == INPUT:
+            shown.append(f"{program.inputs[arguments[0]][0]}[{arguments[1]}]")
+            continue
+        if operation == CONSTANT:
+            text = literal(value)
+            shown.append(f"({text})" if value < 0 else text)
+            continue
+        operands = [shown[j] for j in arguments]
+        if operation not in _MIX:
+            operands = [
+                f"splat({operand})" if program.nodes[j].operation == CONSTANT else operand
+                for operand, j in zip(operands, arguments, strict=True)
+            ]
+        if operation in FUNCTIONS:
+            text = f"real_call{len(operands)}({FUNCTIONS[operation]}, {', '.join(operands)})"
+        else:
+            text = OPERATORS[operation].format(*operands)
+        lines.append(f"const real w{i} = {text};")
+        shown.append(f"w{i}")
+    for name, entries in program.outputs:
+        lines += [
+            f"{name}[{k}] = splat({shown[i]});"
+            if program.nodes[i].operation == CONSTANT
+            else f"{name}[{k}] = {shown[i]};"
+            for k, i in enumerate(entries)
+        ]
+    return lines

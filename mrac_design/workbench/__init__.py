@@ -1,0 +1,1 @@
+"""Interactive panels for notebooks; `view` computes, `panel` only shows."""
