@@ -16,6 +16,7 @@ from rich.logging import RichHandler
 from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn
 from rich.table import Table
 
+from mrac_design.cli_certify import certify, verify
 from mrac_design.cli_options import DesignOptions, StudyOptions, takes
 from mrac_design.errors import MracDesignError
 
@@ -168,6 +169,10 @@ def check_model(
     for name, value in facts.items():
         table.add_row(name.replace("_", " "), _shown(value))
     _output.print(table)
+
+
+app.command()(certify)
+app.command()(verify)
 
 
 def main() -> None:

@@ -47,6 +47,10 @@ class MotionFileError(FileError):
     """A heart-motion file cannot be read as a motion."""
 
 
+class GainFileError(FileError):
+    """A gains file breaks its schema, or its numbers are not those that were written."""
+
+
 class DegreeConditionError(MracDesignError):
     """A polynomial design has no causal solution with the given degrees."""
 
@@ -142,8 +146,13 @@ class CompilationError(MracDesignError):
     def __init__(self, command: Sequence[str], stderr: str) -> None:
         self.command = tuple(command)
         self.stderr = stderr
-        first = next((line for line in stderr.splitlines() if line.strip()), "no message")
+        lines = [line.strip() for line in stderr.splitlines() if line.strip()]
+        first = next((line for line in lines if "error" in line), (lines or ["no message"])[0])
         super().__init__(f"'{' '.join(command)}' failed: {first}")
+
+
+class CodeGenerationError(MracDesignError):
+    """A system holds an operation that the chosen method or machine has no rule for."""
 
 
 class SimulationError(MracDesignError):

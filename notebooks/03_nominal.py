@@ -144,7 +144,8 @@ Markdown(
     f"""The paper's controller keeps the force within **{over_axes(plain, "%")}** of the largest
 desired force, axis by axis; so does, within {over_axes(still, "%")}, the *same controller without
 any adaptation*. {share} of that error is not the heart's: the reference model lags behind the
-desired force by up to {over_axes(model_lag, "%")} at the steps, and both controllers follow the model.
+desired force by up to {over_axes(model_lag, "%")} at the steps, and both controllers follow the
+model.
 
 What adaptation does is seen in the error to the model's output $y_m$: its rms is
 {over_axes(ratios, "")} times the frozen controller's. That gain becomes visible in the force only

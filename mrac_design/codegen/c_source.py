@@ -6,6 +6,8 @@ of which every lane goes the same way. `support` defines the type and what C has
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 import casadi as ca
 
 from mrac_design.codegen.straight_line import CONSTANT, INPUT, StraightLine
@@ -91,13 +93,17 @@ def support(lanes: int) -> str:
     return f"enum {{ LANES = {lanes} }};\n" + _VECTOR
 
 
-def c_routine(program: StraightLine, name: str) -> str:
-    """A static C function: one pointer per input, then one per output, in the program's order."""
+def c_routine(program: StraightLine, name: str, *, inputs: Sequence[str] | None = None) -> str:
+    """A static C function: a pointer for each input, then for each output, in program's order.
+
+    `inputs` names those to keep, where the others are not used.
+    """
+    kept = [n for n, _ in program.inputs] if inputs is None else inputs
     pointers = [
-        *(f"const real *restrict {argument}" for argument, _ in program.inputs),
+        *(f"const real *restrict {argument}" for argument in kept),
         *(f"real *restrict {result}" for result, _ in program.outputs),
     ]
-    names = [n for n, _ in (*program.inputs, *program.outputs)]
+    names = [*kept, *(n for n, _ in program.outputs)]
     unused = " ".join(f"(void){n};" for n in names)
     body = "\n".join(f"    {line}" for line in _statements(program))
     return f"static void {name}({', '.join(pointers)})\n{{\n    {unused}\n{body}\n}}\n"

@@ -50,24 +50,24 @@ def hoist_settled(
     moved = sorted(
         i for i in needed & constant if program.nodes[i].operation not in (INPUT, CONSTANT)
     )
-    setup = _copy(program, skip={}, prepared=0)
-    setup_places, setup_builder = setup
-    first = setup_builder.finish({"prepared": [setup_places[i] for i in moved]})
-    places, builder = _copy(program, skip={i: k for k, i in enumerate(moved)}, prepared=len(moved))
+    places, builder = _copy(program, ready=None)
+    first = builder.finish({"prepared": [places[i] for i in moved]})
+    places, builder = _copy(program, ready=moved)
     body = builder.finish({n: [places[i] for i in entries] for n, entries in program.outputs})
     return first, body
 
 
-def _copy(
-    program: StraightLine, *, skip: dict[int, int], prepared: int
-) -> tuple[list[int], Builder]:
+def _copy(program: StraightLine, *, ready: list[int] | None) -> tuple[list[int], Builder]:
+    """Copy with the values at `ready`, if any are given, read from one more input."""
     builder = Builder()
     inputs = [builder.input(name, length) for name, length in program.inputs]
-    ready = builder.input("prepared", prepared) if skip or prepared else []
+    given: dict[int, int] = {}
+    if ready is not None:
+        given = dict(zip(ready, builder.input("prepared", len(ready)), strict=True))
     place: list[int] = []
     for i, (operation, arguments, value) in enumerate(program.nodes):
-        if i in skip:
-            place.append(ready[skip[i]])
+        if i in given:
+            place.append(given[i])
         elif operation == INPUT:
             place.append(inputs[arguments[0]][arguments[1]])
         elif operation == CONSTANT:

@@ -28,6 +28,7 @@ from mrac_design.design.reference_model import ReferenceModel
 from mrac_design.design.zeros import KeepZeros
 from mrac_design.errors import ParameterError
 from mrac_design.plant import ForcePlant
+from mrac_design.polynomials.diophantine import RESIDUAL_LIMIT
 from mrac_design.polynomials.rationals import decimal_rational
 from mrac_design.time_domain import Continuous
 
@@ -123,14 +124,15 @@ class IntegralRSTDesign:
         return self.solved._repr_latex_()
 
 
-def design_integral_rst(specification: IntegralRSTSpecification) -> IntegralRSTDesign:
+def design_integral_rst(
+    specification: IntegralRSTSpecification, *, residual_limit: float = RESIDUAL_LIMIT
+) -> IntegralRSTDesign:
     """RST controller with integrator in float64.
 
-    Raises IllConditionedError when the residual exceeds 1e-10 of Ao Am.
+    Raises IllConditionedError when the residual exceeds `residual_limit`.
     """
-    return IntegralRSTDesign(
-        specification=specification, solved=place_poles(specification.placement)
-    )
+    solved = place_poles(specification.placement, residual_limit=residual_limit)
+    return IntegralRSTDesign(specification=specification, solved=solved)
 
 
 def design_integral_rst_exact(specification: IntegralRSTSpecification) -> ExactPolynomialDesign:

@@ -24,7 +24,7 @@ from mrac_design.design.reference_model import ReferenceModel
 from mrac_design.design.zeros import KeepZeros
 from mrac_design.errors import ParameterError
 from mrac_design.plant import ForcePlant
-from mrac_design.polynomials.diophantine import SylvesterSystem
+from mrac_design.polynomials.diophantine import RESIDUAL_LIMIT, SylvesterSystem
 from mrac_design.polynomials.rationals import decimal_rational
 
 
@@ -195,12 +195,15 @@ def diophantine_system(specification: RSTSpecification) -> SylvesterSystem:
     return SylvesterSystem.of(specification.placement.equation)
 
 
-def design_rst(specification: RSTSpecification) -> RSTDesign:
+def design_rst(
+    specification: RSTSpecification, *, residual_limit: float = RESIDUAL_LIMIT
+) -> RSTDesign:
     """RST controller of the force plant in float64, with its residual.
 
-    Raises IllConditionedError when the residual exceeds 1e-10 of Ao Am.
+    Raises IllConditionedError when the residual exceeds `residual_limit`.
     """
-    return RSTDesign(specification=specification, solved=place_poles(specification.placement))
+    solved = place_poles(specification.placement, residual_limit=residual_limit)
+    return RSTDesign(specification=specification, solved=solved)
 
 
 def design_rst_exact(specification: RSTSpecification) -> ExactPolynomialDesign:

@@ -105,7 +105,9 @@ def c_statements(
     read = [function.sparsity_in(i).row() for i in range(function.n_in())]
     written = [function.sparsity_out(i).row() for i in range(function.n_out())]
     lines: list[str] = []
-    results = {(i, j): number.literal(0.0) for i, own in enumerate(outputs) for j in range(len(own))}
+    results = {
+        (i, j): number.literal(0.0) for i, own in enumerate(outputs) for j in range(len(own))
+    }
     names: dict[int, str] = {}
     for k in range(function.n_instructions()):
         operation = function.instruction_id(k)

@@ -1,70 +1,39 @@
-"""Controller gains as JSON, with units and a hash that ties them to their design."""
+"""Gains of a tuned controller: the value, its documents and its files, under one name.
+
+gains = read_gains(Path("gains.yaml"))
+step = build_step(controller_of(gains, Discrete(1e-3)))
+"""
 
 from __future__ import annotations
 
-import hashlib
-import json
 from typing import Any
 
-from mrac_design.controller.adaptive import GAIN_NAMES
 from mrac_design.design import RSTDesign
+from mrac_design.export.gain_document import document_hash, document_of, gains_schema_path
+from mrac_design.export.gain_formats import read_gains, write_gains
+from mrac_design.export.gain_set import GainSet, controller_of, gain_set, robot_step_of
 from mrac_design.simulation.scenario import Scenario
+from mrac_design.study import VARIANTS, Variant
 
-_UNITS = ("1/s", "m/(N·s)", "m/(N·s²)", "m/(N·s)", "m/(N·s²)")
+__all__ = [
+    "GainSet",
+    "controller_of",
+    "document_hash",
+    "document_of",
+    "gain_set",
+    "gains_document",
+    "gains_schema_path",
+    "read_gains",
+    "robot_step_of",
+    "write_gains",
+]
 
 
-def gains_document(scenario: Scenario, design: RSTDesign) -> dict[str, Any]:
-    """Everything a robot needs to run the controller of `scenario`, as plain data.
+def gains_document(
+    scenario: Scenario, design: RSTDesign, variant: Variant = VARIANTS[-1]
+) -> dict[str, Any]:
+    """The gains of a study's controller as plain data, with units.
 
-    `gains` holds θ in SI units with r1 itself (the adapted r1' is r1 − ao); `hash` is the SHA-256
-    of the rest in canonical JSON, so an edited file is noticed.
+    `hash` is the SHA-256 of the rest in canonical JSON: it tells one set of gains from another.
     """
-    adaptation, choice = scenario.adaptation, scenario.design
-    document: dict[str, Any] = {
-        "format": "mrac_design gains 1",
-        "scenario": scenario.name,
-        "plant": {
-            "stiffness": _quantity(choice.stiffness, "N/m"),
-            "velocity_gain": _quantity(choice.velocity_gain, "1/s"),
-        },
-        "reference_model": {
-            "bandwidth": _quantity(choice.bandwidth, "rad/s"),
-            "damping": _quantity(choice.damping, "1"),
-        },
-        "observer_pole": _quantity(choice.observer_pole, "rad/s"),
-        "prefilter": {
-            "bandwidth": _quantity(scenario.prefilter.bandwidth, "rad/s"),
-            "damping": _quantity(scenario.prefilter.damping, "1"),
-        },
-        "gains": {
-            name: _quantity(value, unit)
-            for name, value, unit in zip(
-                ("r1", "s0", "s1", "t0", "t1"),
-                (design.r1, design.s0, design.s1, design.t0, design.t1),
-                _UNITS,
-                strict=True,
-            )
-        },
-        "scaling": {
-            name: _quantity(value, unit)
-            for name, value, unit in zip(GAIN_NAMES[:5], design.scaling, _UNITS, strict=True)
-        },
-        "adaptation": {
-            "law": adaptation.law,
-            "gain": _quantity(adaptation.gain, "1" if adaptation.law == "normalised" else "1/N²"),
-            "normalisation": _quantity(adaptation.normalisation, "N²"),
-            "bias_force": _quantity(adaptation.bias_force, "N"),
-        },
-    }
-    return {**document, "hash": document_hash(document)}
-
-
-def document_hash(document: dict[str, Any]) -> str:
-    """SHA-256 of the document without its `hash`, in canonical JSON."""
-    content = {key: value for key, value in document.items() if key != "hash"}
-    text = json.dumps(content, sort_keys=True, separators=(",", ":"), ensure_ascii=True)
-    return hashlib.sha256(text.encode()).hexdigest()
-
-
-def _quantity(value: float, unit: str) -> dict[str, Any]:
-    return {"value": float(value), "unit": unit}
+    return document_of(gain_set(scenario, design, variant))

@@ -36,8 +36,10 @@ def decimal_rational(value: Number) -> fmpq:
     if isinstance(value, fmpq | fmpz):
         return fmpq(value)
     try:
-        if isinstance(value, str | Rational | np.integer):
-            fraction = Fraction(value if isinstance(value, str | Rational) else int(value))
+        if isinstance(value, np.integer):
+            fraction = Fraction(int(value))
+        elif isinstance(value, str | Rational):
+            fraction = Fraction(value)
         else:
             fraction = Fraction(repr(float(value)))
     except (TypeError, ValueError, ZeroDivisionError) as error:
@@ -146,7 +148,7 @@ def polynomial_latex(polynomial: fmpq_poly | Sequence[float] | FloatArray, varia
     if not terms:
         return "0"
     text = " ".join(_term(sign, size, power, variable) for (sign, size), power in terms[::-1])
-    return text.removeprefix("+ ").replace("- ", "-", 1) if text.startswith(("+ ", "- ")) else text
+    return text.removeprefix("+ ") if text[0] == "+" else "-" + text[2:]
 
 
 def _term(sign: str, size: str, power: int, variable: str) -> str:

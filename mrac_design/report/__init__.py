@@ -1,7 +1,8 @@
 """Figures, tables and the rendering of notebooks to HTML and PDF; results come in finished.
 
-style → figures_*, tables → saving; publishing, execution, composition → rendering →
-study_report, which writes the folder of a whole study.
+style → figures_*, tables, provenance → saving; execution, composition → rendering →
+study_report, which writes the folder of a whole study. What notebooks show is gathered here;
+what runs notebooks is imported by its own name, because a notebook has no use for it.
 """
 
 from mrac_design.report.figures_design import (
@@ -21,7 +22,6 @@ from mrac_design.report.figures_study import (
     torque_figure,
 )
 from mrac_design.report.provenance import scenario_provenance
-from mrac_design.report.rendering import render_report
 from mrac_design.report.saving import save_figures
 from mrac_design.report.tables import (
     Quantity,
@@ -45,7 +45,6 @@ __all__ = [
     "pole_figure",
     "posture_figure",
     "realness_figure",
-    "render_report",
     "save_figures",
     "scenario_provenance",
     "sensitivity_figure",

@@ -6,9 +6,12 @@ import base64
 import re
 from collections.abc import Iterator, Mapping
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import pypandoc
-from nbformat import NotebookNode
+
+if TYPE_CHECKING:
+    from nbformat import NotebookNode
 
 _TERMINAL_COLOUR = re.compile(r"\x1b\[[0-9;]*m")
 _PIPE_TABLES = "markdown-simple_tables-multiline_tables-grid_tables"

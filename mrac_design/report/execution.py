@@ -2,12 +2,15 @@
 
 from __future__ import annotations
 
-import contextlib
+import asyncio
+import atexit
 import json
 import os
 import re
 import sys
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Coroutine, Mapping, Sequence
+from concurrent.futures import ThreadPoolExecutor
+from functools import partial
 from pathlib import Path
 
 import jupytext
@@ -31,41 +34,100 @@ def read_notebook(path: Path) -> NotebookNode:
         raise NotebookError(path, "cannot be read", str(problem)) from problem
 
 
-def execute_notebook(
-    path: Path,
+def execute_notebooks(
+    paths: Sequence[Path],
     folder: Path,
     environment: Mapping[str, str],
-    cell_done: Callable[[int, int], None],
-) -> NotebookNode:
-    """Execute the notebook at `path` and return it with the outputs of its cells.
+    cells_done: Callable[[str, float], None],
+) -> list[NotebookNode]:
+    """Execute notebooks side by side, each in a kernel of its own; outputs fill their cells.
 
-    `folder` is an existing scratch folder: working directory, kernel description and
-    connection file lie there, so no kernel need be installed and no home be writable.
-    `environment` is added to the kernel's environment variables. `cell_done(cells done, cells)`
-    is called after each cell. Raises NotebookError naming the cell and its exception.
+    `folder` is an existing scratch folder: working directories, kernel descriptions and
+    connection files lie there, so no kernel need be installed and no home be writable.
+    `environment` is added to the kernels' environment variables. `cells_done(name, fraction of
+    all cells)` is called after each cell. The first failure ends all of them; raises
+    NotebookError naming notebook, cell and exception.
     """
-    notebook = read_notebook(path)
+    notebooks = [read_notebook(path) for path in paths]
+    total = sum(len(notebook.cells) for notebook in notebooks) or 1
+    finished = 0
+
+    def cell_done(path: Path) -> None:
+        nonlocal finished
+        finished += 1
+        cells_done(path.name, finished / total)
+
+    async def execute_all() -> None:
+        async with asyncio.TaskGroup() as group:
+            for number, (path, notebook) in enumerate(zip(paths, notebooks, strict=True)):
+                scratch = folder / f"run-{number}"
+                scratch.mkdir()
+                group.create_task(
+                    _execute(path, notebook, scratch, environment, partial(cell_done, path))
+                )
+
+    try:
+        _run_in_thread(execute_all())
+    except* NotebookError as failures:
+        # Those after the first are the other notebooks, cancelled on its account.
+        raise failures.exceptions[0] from None
+    return notebooks
+
+
+def _run_in_thread(work: Coroutine[None, None, None]) -> None:
+    """Run `work` in an event loop of its own; an interruption here cancels it there.
+
+    A thread, because the caller may be inside an event loop (a notebook), and because nbclient
+    takes over the signals of the main thread.
+    """
+    tasks: list[asyncio.Task[None]] = []
+
+    async def registered() -> None:
+        tasks.append(asyncio.ensure_future(work))
+        await tasks[0]
+
+    with ThreadPoolExecutor(1) as pool:
+        result = pool.submit(asyncio.run, registered())
+        try:
+            result.result()
+        except KeyboardInterrupt:
+            for task in tasks:
+                task.get_loop().call_soon_threadsafe(task.cancel)
+            raise
+
+
+async def _execute(
+    path: Path,
+    notebook: NotebookNode,
+    scratch: Path,
+    environment: Mapping[str, str],
+    cell_done: Callable[[], None],
+) -> None:
     client = NotebookClient(
         notebook,
-        km=_kernel_manager(folder),
+        km=_kernel_manager(scratch),
         timeout=None,
-        resources={"metadata": {"path": str(folder)}},
+        resources={"metadata": {"path": str(scratch)}},
     )
-    count = len(notebook.cells)
-    try:
-        with client.setup_kernel(env=_kernel_environment(folder, environment)):
-            for index, cell in enumerate(notebook.cells):
-                _execute_cell(client, path, cell, index)
-                cell_done(index + 1, count)
-    except (RuntimeError, OSError) as problem:
-        raise NotebookError(path, "the Python kernel did not start", str(problem)) from problem
-    return notebook
+    log_file = scratch / "kernel.log"
+    with log_file.open("wb") as log:
+        options = {"env": _kernel_environment(scratch, environment), "stdout": log, "stderr": log}
+        try:
+            async with client.async_setup_kernel(cleanup_kc=True, **options):
+                for index, cell in enumerate(notebook.cells):
+                    await _execute_cell(client, path, cell, index)
+                    cell_done()
+        except (RuntimeError, OSError) as problem:
+            # nbclient leaves this behind when a kernel does not start; at exit it would fail.
+            atexit.unregister(client._cleanup_kernel)
+            said = log_file.read_text(errors="replace").strip().splitlines() or [str(problem)]
+            raise NotebookError(path, "the Python kernel did not start", said[-1]) from problem
 
 
-def _execute_cell(client: NotebookClient, path: Path, cell: NotebookNode, index: int) -> None:
+async def _execute_cell(client: NotebookClient, path: Path, cell: NotebookNode, index: int) -> None:
     place = f"cell {index + 1} ({_first_line(cell.source)})"
     try:
-        client.execute_cell(cell, index)
+        await client.async_execute_cell(cell, index)
     except CellExecutionError as failure:
         raise NotebookError(path, place, _exception_text(failure)) from None
     except DeadKernelError as failure:
@@ -114,6 +176,4 @@ def _exception_text(failure: CellExecutionError) -> str:
         found = re.match(r"-+> (\d+) (.*)", line)
         if found and not marked:
             marked = f" at line {found[1]} of the cell: {found[2].strip()}"
-    with contextlib.suppress(UnicodeError):
-        text = _TERMINAL_COLOUR.sub("", text)
-    return text + marked
+    return _TERMINAL_COLOUR.sub("", text) + marked

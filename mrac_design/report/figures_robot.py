@@ -16,7 +16,7 @@ _VIEWS = ((0, 2), (0, 1))
 def posture_figure(robot: RobotDescription) -> CaptionedFigure:
     """The robot at its home posture (m): joints, links, tool and tip."""
     figure = new_figure(
-        3.2, f"{robot.name} at its home posture, from the side (left) and from above (right)."
+        2.8, f"{robot.name} at its home posture, from the side (left) and from above (right)."
     )
     points = home_points(robot)
     chain, frames, tool = points[:-1], points[1:-1], points[-2:]

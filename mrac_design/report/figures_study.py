@@ -141,11 +141,11 @@ def gains_figure(study: StudyRecord, variant: str = "adaptive") -> CaptionedFigu
     lines = []
     for ax, name in zip(axes, names, strict=True):
         own = [i for i, label in enumerate(labels) if label.startswith(f"{name} ")]
-        moving = [i for i in own if np.ptp(values[:, i]) > 0]
-        for i, colour in zip(moving, SERIES_COLOURS, strict=False):
+        for i, colour in zip(own, SERIES_COLOURS, strict=False):
             change = values[:, i] - values[0, i]
-            label = labels[i].removeprefix(f"{name} ")
-            lines += ax.plot(*thinned(trajectory.time, change), color=colour, label=label)
+            if np.any(change):
+                label = labels[i].removeprefix(f"{name} ")
+                lines += ax.plot(*thinned(trajectory.time, change), color=colour, label=label)
     legend_above(figure, lines)
     return figure
 

@@ -12,7 +12,7 @@ import typst
 from mrac_design.errors import NotebookError, RenderingError
 from mrac_design.publishing import publish_file, staging_folder
 from mrac_design.report.composition import compose_markdown
-from mrac_design.report.execution import execute_notebook
+from mrac_design.report.execution import execute_notebooks
 
 ReportProgress = Callable[[str, float], None]
 """Called with what is being done and the fraction (0…1) of the rendering that is done."""
@@ -39,7 +39,7 @@ def render_report(
     pdf: Path,
     progress: ReportProgress = ignore_progress,
 ) -> None:
-    """Execute `notebooks` in order and write them as chapters of `html` and `pdf`.
+    """Execute `notebooks` and write them, in order, as chapters of `html` and `pdf`.
 
     The notebooks find the path of the `scenario` file in the environment variable
     MRAC_SCENARIO. Both files are complete when they appear; when anything fails, or the run
@@ -69,18 +69,16 @@ def render_report(
 def _executed_markdown(
     notebooks: Sequence[Path], scenario: Path, folder: Path, progress: ReportProgress
 ) -> str:
-    environment = {"MRAC_SCENARIO": str(scenario.absolute())}
-    chapters = []
-    for number, path in enumerate(notebooks):
-
-        def cell_done(done: int, count: int, number: int = number, path: Path = path) -> None:
-            fraction = (number + done / count) / len(notebooks)
-            progress(f"running {path.name}, cell {done} of {count}", _EXECUTION_SHARE * fraction)
-
-        scratch = folder / f"run-{number}"
-        scratch.mkdir()
-        notebook = execute_notebook(path, scratch, environment, cell_done)
-        chapters.append(compose_markdown(notebook, path.stem, folder))
+    executed = execute_notebooks(
+        notebooks,
+        folder,
+        {"MRAC_SCENARIO": str(scenario.absolute())},
+        lambda name, done: progress(f"running {name}", _EXECUTION_SHARE * done),
+    )
+    chapters = [
+        compose_markdown(notebook, path.stem, folder)
+        for path, notebook in zip(notebooks, executed, strict=True)
+    ]
     return "\n\n".join(chapters)
 
 

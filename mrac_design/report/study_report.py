@@ -46,7 +46,7 @@ def write_study_report(
         render_report(
             [notebooks_directory() / name for name in REPORT_NOTEBOOKS],
             title=scenario.title,
-            subtitle=f"{study.robot.name}, {study.motion.name}, "
+            subtitle=f"Robot {study.robot.name}, heart motion {study.motion.name}, "
             f"mrac_design {version('mrac-design')}",
             scenario=folder / "scenario.toml",
             html=folder / "report.html",

@@ -4,19 +4,22 @@ from __future__ import annotations
 
 import ctypes
 import logging
-from typing import Protocol
+from typing import Any, Protocol
 
 import casadi as ca
 import numpy as np
 
 from mrac_design.arrays import FloatArray
+from mrac_design.codegen.machine import casadi_function
+from mrac_design.codegen.trigonometry import lower_trigonometry
 from mrac_design.errors import CompilationError
 from mrac_design.simulation.compilation import compile_library, find_compiler
 from mrac_design.simulation.emission import simplified
+from mrac_design.simulation.method import Method
 from mrac_design.simulation.program import c_program
 from mrac_design.simulation.schedule import Schedule
+from mrac_design.simulation.stepping import prepare, step_program
 from mrac_design.simulation.system import HybridSystem
-from mrac_design.simulation.tableau import ButcherTableau
 
 _LOG = logging.getLogger(__name__)
 
@@ -42,7 +45,7 @@ class Engine(Protocol):
         """
 
 
-def build_engine(system: HybridSystem, method: ButcherTableau, *, input_powers: int) -> Engine:
+def build_engine(system: HybridSystem, method: Method, *, input_powers: int) -> Engine:
     """Compiled C where a compiler works, else CasADi's interpreter, with a warning."""
     compiler = find_compiler()
     if compiler is None:
@@ -59,14 +62,12 @@ class CompiledEngine:
     """The C program of the system in a shared library; nothing of Python inside the loop."""
 
     def __init__(
-        self, system: HybridSystem, method: ButcherTableau, *, input_powers: int, compiler: str
+        self, system: HybridSystem, method: Method, *, input_powers: int, compiler: str
     ) -> None:
         self.name = "compiled C"
         self._outputs = system.outputs.size
         library = compile_library(c_program(system, method, input_powers=input_powers), compiler)
-        self._run = library.run
-        self._run.restype = ctypes.c_long
-        self._run.argtypes = [ctypes.c_long] + 11 * [ctypes.c_void_p]
+        self._run = run_entry(library.run)
 
     def run(
         self,
@@ -77,34 +78,50 @@ class CompiledEngine:
         state: FloatArray,
         held: FloatArray,
     ) -> FloatArray:
-        intervals = [
-            np.ascontiguousarray(values[part])
-            for values in (
-                schedule.length, schedule.substeps, schedule.segment, schedule.offset,
-                schedule.records, schedule.updates,
-            )
-        ]  # fmt: skip
         recorded = np.empty((int(schedule.records[part].sum()), self._outputs))
-        arrays = [*intervals, np.ascontiguousarray(coefficients), parameters, state, held, recorded]
-        count = self._run(intervals[0].size, *(array.ctypes.data for array in arrays))
-        assert count == recorded.shape[0]
+        arrays = (coefficients, parameters, state, held, recorded)
+        rows = run_part(self._run, schedule, part, *arrays)
+        assert rows == recorded.shape[0]
         return recorded
 
 
-_BATCHES = (64, 8, 1)
-"""Numbers of steps CasADi's interpreter takes in one call: fewer calls, no step too many."""
+def run_entry(address: Any) -> Any:
+    """The foreign function `run` of a generated program, ready to be called."""
+    address.restype = ctypes.c_long
+    address.argtypes = [ctypes.c_long] + 12 * [ctypes.c_void_p]
+    return address
+
+
+def run_part(entry: Any, schedule: Schedule, part: slice, *arrays: FloatArray) -> int:
+    """Run part of a schedule on a generated program; returns how many records it met.
+
+    `arrays` are coefficients, parameters, state, held memory and the records or accumulators;
+    state, memory and the last are written.
+    """
+    intervals = [
+        np.ascontiguousarray(values[part])
+        for values in (
+            schedule.start, schedule.length, schedule.substeps, schedule.segment, schedule.offset,
+            schedule.records, schedule.updates,
+        )
+    ]  # fmt: skip
+    assert all(array.flags.c_contiguous for array in arrays)
+    pointers = (array.ctypes.data for array in (*intervals, *arrays))
+    return int(entry(intervals[0].size, *pointers))
 
 
 class InterpretedEngine:
     """CasADi's own machine, for computers without a compiler: the same operations in order."""
 
-    def __init__(self, system: HybridSystem, method: ButcherTableau, *, input_powers: int) -> None:
+    def __init__(self, system: HybridSystem, method: Method, *, input_powers: int) -> None:
         self.name = "CasADi interpreter"
-        self._system = system
-        self._output = simplified(system.output)
+        self._outputs = system.outputs.size
+        rate, output = prepare(system.rate), prepare(system.output)
+        self._rate_setup = casadi_function(rate.setup, "rate_setup")
+        self._output_setup = casadi_function(output.setup, "output_setup")
+        self._output = casadi_function(lower_trigonometry(output.body), "output")
         self._update = simplified(system.update) if system.update is not None else None
-        step = _step_function(system, method, input_powers)
-        self._steps = {n: step.mapaccum(f"steps_{n}", n, {"base": 4}) for n in _BATCHES}
+        self._step = casadi_function(step_program(system, rate, method, input_powers), "step")
 
     def run(
         self,
@@ -115,38 +132,27 @@ class InterpretedEngine:
         state: FloatArray,
         held: FloatArray,
     ) -> FloatArray:
+        x, z, nothing = ca.DM(state), ca.DM(held), ca.DM()
+        prepared = self._rate_setup(nothing, nothing, nothing, parameters)
+        ready = self._output_setup(nothing, nothing, nothing, parameters)
         rows = []
         for i in range(*part.indices(schedule.length.size)):
             segment = coefficients[schedule.segment[i]]
             if schedule.updates[i] or schedule.records[i]:
                 inputs = _polynomial(segment, schedule.offset[i])
                 if schedule.updates[i] and self._update is not None:
-                    held[:] = self._update(state, held, inputs, parameters).full().ravel()
+                    z = self._update(x, z, inputs, parameters)
                 if schedule.records[i]:
-                    rows.append(self._output(state, held, inputs, parameters).full().ravel())
-            self._advance(schedule, i, segment, parameters, state, held)
-        return np.array(rows).reshape(len(rows), self._system.outputs.size)
-
-    def _advance(
-        self,
-        schedule: Schedule,
-        i: int,
-        segment: FloatArray,
-        parameters: FloatArray,
-        state: FloatArray,
-        held: FloatArray,
-    ) -> None:
-        count = int(schedule.substeps[i])
-        h = schedule.length[i] / count
-        first = 0
-        while first < count:
-            size = next(n for n in _BATCHES if n <= count - first)
-            offsets = schedule.offset[i] + np.arange(first, first + size) * h
-            result = self._steps[size](
-                state, held, segment.ravel(), offsets[None, :], h, parameters
-            )
-            state[:] = result[:, -1].full().ravel()
-            first += size
+                    rows.append(self._output(x, z, inputs, parameters, ready).full().ravel())
+            flat = ca.DM(segment.ravel())
+            h = schedule.length[i] / schedule.substeps[i]
+            for j in range(schedule.substeps[i]):
+                time, rest = schedule.offset[i] + j * h, h
+                while rest > 0:
+                    x, used = self._step(x, z, flat, time, rest, parameters, prepared)
+                    time, rest = time + float(used), rest - float(used)
+        state[:], held[:] = x.full().ravel(), z.full().ravel()
+        return np.array(rows).reshape(len(rows), self._outputs)
 
 
 def _polynomial(coefficients: FloatArray, s: float) -> FloatArray:
@@ -154,30 +160,3 @@ def _polynomial(coefficients: FloatArray, s: float) -> FloatArray:
     for k in range(coefficients.shape[1] - 2, -1, -1):
         value = value * s + coefficients[:, k]
     return value
-
-
-def _step_function(system: HybridSystem, method: ButcherTableau, input_powers: int) -> ca.Function:
-    """One Runge–Kutta step, in the order of operations of the C program."""
-    x, z, _, p = system.arguments()
-    coefficients = ca.SX.sym("coefficients", system.inputs.size * input_powers)
-    s, h = ca.SX.sym("s"), ca.SX.sym("h")
-    table = ca.reshape(coefficients, input_powers, system.inputs.size).T
-    stages: list[ca.SX] = []
-    for row, fraction in zip(method.a, method.c, strict=True):
-        time = s + float(fraction) * h
-        inputs = table[:, -1]
-        for k in range(input_powers - 2, -1, -1):
-            inputs = inputs * time + table[:, k]
-        stages.append(system.rate(_combine(x, h, stages, row), z, inputs, p))
-    following = _combine(x, h, stages, method.b)
-    return ca.Function("step", [x, z, coefficients, s, h, p], [following])
-
-
-def _combine(x: ca.SX, h: ca.SX, stages: list[ca.SX], weights: FloatArray) -> ca.SX:
-    terms = [float(w) * k for w, k in zip(weights, stages, strict=False) if w != 0]
-    if not terms:
-        return x
-    total = terms[0]
-    for term in terms[1:]:
-        total = total + term
-    return x + h * total

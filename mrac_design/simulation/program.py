@@ -1,91 +1,200 @@
-"""The C program of a hybrid system under an explicit Runge–Kutta method."""
+"""The C program that runs a hybrid system under an integration method."""
 
 from __future__ import annotations
 
+import casadi as ca
 import numpy as np
 
+from mrac_design.codegen.c_source import c_routine, support
+from mrac_design.codegen.trigonometry import lower_trigonometry
 from mrac_design.simulation.emission import c_function, simplified
+from mrac_design.simulation.method import Method
+from mrac_design.simulation.stepping import ARGUMENTS, Prepared, prepare, step_program
 from mrac_design.simulation.system import HybridSystem
 from mrac_design.simulation.tableau import ButcherTableau
-
-_ARGUMENTS = ("x", "z", "v", "p")
 
 _TEMPLATE = """\
 #include <math.h>
 #include <stddef.h>
 #include <string.h>
+#if defined(__SSE2__)
+#include <xmmintrin.h>
+#endif
 
-enum {{ NX = {states}, NZ = {held}, NV = {inputs}, NY = {outputs}, POWERS = {powers} }};
+{support}
+enum {{
+    NX = {states}, NZ = {held}, NV = {inputs}, NY = {outputs}, NP = {parameters},
+    POWERS = {powers}, PREPARED = {prepared}, READY = {ready}
+}};
 
 {functions}
 /* Value of the inputs at time s after the beginning of their segment. */
-static void inputs_at(const double *restrict coefficients, double s, double *restrict v)
+static inline void inputs_at(const real *restrict segment, real s, real *restrict v)
 {{
     for (int i = 0; i < NV; ++i) {{
-        const double *c = coefficients + (size_t)i * POWERS;
-        double value = c[POWERS - 1];
+        const real *c = segment + (size_t)i * POWERS;
+        real value = c[POWERS - 1];
         for (int k = POWERS - 2; k >= 0; --k) value = value * s + c[k];
         v[i] = value;
     }}
 }}
 
-/* One step of the {method} method from time s within the segment. */
-static void step(double *restrict x, const double *restrict z, const double *restrict coefficients,
-                 const double *restrict p, double s, double h)
+/* The memory's change, number by number: the very function that goes to the robot. */
+static void sample(const real *x, real *z, const real *v, const real *p)
 {{
-    double k[{stages}][NX + 1], y[NX + 1], v[NV + 1];
-{stage_code}
+    double own_x[NX + 1], own_z[NZ + 1], own_v[NV + 1], own_p[NP + 1], next[NZ + 1];
+    for (int l = 0; l < LANES; ++l) {{
+        for (int i = 0; i < NX; ++i) own_x[i] = ((const double *)(x + i))[l];
+        for (int i = 0; i < NZ; ++i) own_z[i] = ((const double *)(z + i))[l];
+        for (int i = 0; i < NV; ++i) own_v[i] = ((const double *)(v + i))[l];
+        for (int i = 0; i < NP; ++i) own_p[i] = ((const double *)(p + i))[l];
+        update(own_x, own_z, own_v, own_p, next);
+        for (int i = 0; i < NZ; ++i) ((double *)(z + i))[l] = next[i];
+    }}
 }}
 
-/* Runs n intervals; returns how many rows of `recorded` were written. */
-long run(long n, const double *length, const long long *substeps, const long long *segment,
-         const double *offset, const unsigned char *records, const unsigned char *updates,
-         const double *coefficients, const double *p, double *x, double *z, double *recorded)
+{step}
+/* Denormal numbers make decaying states forty times slower and mean nothing: they are zero
+   inside a run. Returns the state to restore. */
+static unsigned flush_denormals(void)
 {{
-    double v[NV + 1], next[NZ + 1];
+#if defined(__SSE2__)
+    const unsigned before = _mm_getcsr();
+    _mm_setcsr(before | 0x8040u);
+    return before;
+#else
+    return 0;
+#endif
+}}
+
+static void restore_denormals(unsigned before)
+{{
+#if defined(__SSE2__)
+    _mm_setcsr(before);
+#else
+    (void)before;
+#endif
+}}
+
+/* Runs n intervals; returns how many of them began with a record. */
+long run(long n, const double *start, const double *length, const long long *substeps,
+         const long long *segment, const double *offset, const unsigned char *records,
+         const unsigned char *updates, const real *coefficients, const real *p, real *x, real *z,
+         real *recorded)
+{{
+    const unsigned before = flush_denormals();
+    real v[NV + 1], prepared[PREPARED + 1], ready[READY + 1];
     long rows = 0;
+    rate_setup(p, prepared);
+    record_setup(p, ready);
     for (long i = 0; i < n; ++i) {{
-        const double *c = coefficients + (size_t)segment[i] * NV * POWERS;
-        if (records[i] || updates[i]) inputs_at(c, offset[i], v);
-        if (updates[i]) {{
-            update(x, z, v, p, next);
-            memcpy(z, next, NZ * sizeof *z);
+        const real *c = coefficients + (size_t)segment[i] * NV * POWERS;
+        if (records[i] || updates[i]) inputs_at(c, splat(offset[i]), v);
+        if (updates[i]) sample(x, z, v, p);
+        if (records[i]) {{
+            {record}
+            ++rows;
         }}
-        if (records[i]) output(x, z, v, p, recorded + NY * rows++);
         const double h = length[i] / (double)substeps[i];
         for (long long j = 0; j < substeps[i]; ++j)
-            step(x, z, c, p, offset[i] + (double)j * h, h);
+            step(x, z, c, p, prepared, offset[i] + (double)j * h, h);
     }}
+    restore_denormals(before);
     return rows;
 }}
 """
 
+_RUNGE_KUTTA = """\
+/* One step of the {name} method from time s within the segment. */
+static void step(real *restrict x, const real *restrict z, const real *restrict segment,
+                 const real *restrict p, const real *restrict prepared, double s, double h)
+{{
+    real k[{stages}][NX + 1], y[NX + 1], v[NV + 1];
+{code}
+}}
+"""
 
-def c_program(system: HybridSystem, method: ButcherTableau, *, input_powers: int) -> str:
-    """Source with one exported function, `run`; `input_powers` is the inputs' degree + 1."""
-    functions = [
-        c_function(simplified(system.rate), "rate", inputs=_ARGUMENTS, output="dx"),
-        c_function(simplified(system.output), "output", inputs=_ARGUMENTS, output="y"),
+_SERIES = """\
+/* From time s within the segment over h, in as many steps of the {name} as its error asks for. */
+static void step(real *restrict x, const real *restrict z, const real *restrict segment,
+                 const real *restrict p, const real *restrict prepared, double s, double h)
+{{
+    real following[NX + 1], used, time = splat(s), rest = splat(h);
+    do {{
+        advance(x, z, segment, &time, &rest, p, prepared, following, &used);
+        memcpy(x, following, NX * sizeof *x);
+        time = time + used;
+        rest = rest - used;
+    }} while (real_any(rest > 0.0));
+}}
+"""
+
+_RECORD = "output(x, z, v, p, ready, recorded + (size_t)NY * rows);"
+_REDUCE = """const real now = splat(start[i]);
+            real next[NY + 1];
+            fold(x, z, v, p, recorded, &now, ready, next);
+            memcpy(recorded, next, NY * sizeof *next);"""
+
+
+def c_program(
+    system: HybridSystem,
+    method: Method,
+    *,
+    input_powers: int,
+    lanes: int = 1,
+    reduction: ca.Function | None = None,
+) -> str:
+    """Source with one exported function, `run`, for `lanes` runs in lockstep.
+
+    `input_powers` is the inputs' degree + 1. Records the system's outputs, or, given a
+    `reduction` (state, held, input, parameters, accumulators, time) → accumulators, folds it over
+    the recording instants. Arrays of one run are (...,), of several (..., lanes).
+    """
+    rate = prepare(system.rate)
+    step, routines = _step(system, rate, method, input_powers)
+    if reduction is None:
+        record, size = prepare(system.output), system.outputs.size
+    else:
+        record = prepare(reduction, names=(*ARGUMENTS, "accumulators", "now"))
+        size = reduction.numel_out(0)
+    routines += [
+        c_routine(rate.setup, "rate_setup", inputs=["p"]),
+        c_routine(record.setup, "record_setup", inputs=["p"]),
+        c_routine(lower_trigonometry(record.body), "output" if reduction is None else "fold"),
         _update(system),
     ]
     return _TEMPLATE.format(
+        support=support(lanes),
         states=system.state.size,
         held=system.held.size,
         inputs=system.inputs.size,
-        outputs=system.outputs.size,
+        outputs=size,
+        parameters=system.parameters.size,
         powers=input_powers,
-        functions="\n".join(functions),
-        method=method.name,
-        stages=method.stages,
-        stage_code="\n".join(_stage_lines(method)),
+        prepared=len(rate.setup.output("prepared")),
+        ready=len(record.setup.output("prepared")),
+        functions="\n".join(routines),
+        step=step,
+        record=_RECORD if reduction is None else _REDUCE,
     )
+
+
+def _step(
+    system: HybridSystem, rate: Prepared, method: Method, powers: int
+) -> tuple[str, list[str]]:
+    if isinstance(method, ButcherTableau):
+        code = "\n".join(_stage_lines(method))
+        step = _RUNGE_KUTTA.format(name=method.name, stages=method.stages, code=code)
+        return step, [c_routine(lower_trigonometry(rate.body), "rate")]
+    advance = step_program(system, rate, method, powers)
+    return _SERIES.format(name=method.name), [c_routine(advance, "advance")]
 
 
 def _update(system: HybridSystem) -> str:
     if system.update is not None:
-        return c_function(simplified(system.update), "update", inputs=_ARGUMENTS, output="next")
-    arguments = ", ".join(f"const double *restrict {name}" for name in _ARGUMENTS)
-    unused = " ".join(f"(void){name};" for name in (*_ARGUMENTS, "next"))
+        return c_function(simplified(system.update), "update", inputs=ARGUMENTS, output="next")
+    arguments = ", ".join(f"const double *restrict {name}" for name in ARGUMENTS)
+    unused = " ".join(f"(void){name};" for name in (*ARGUMENTS, "next"))
     return f"static void update({arguments}, double *restrict next)\n{{\n    {unused}\n}}\n"
 
 
@@ -98,8 +207,9 @@ def _stage_lines(method: ButcherTableau) -> list[str]:
             )
         # A stage at the same instant as the one before sees the same input.
         if stage == 0 or method.c[stage] != method.c[stage - 1]:
-            lines.append(f"    inputs_at(coefficients, s + {float(method.c[stage])!r} * h, v);")
-        lines.append(f"    rate({'y' if stage else 'x'}, z, v, p, k[{stage}]);")
+            time = f"s + {float(method.c[stage])!r} * h"
+            lines.append(f"    inputs_at(segment, splat({time}), v);")
+        lines.append(f"    rate({'y' if stage else 'x'}, z, v, p, prepared, k[{stage}]);")
     lines.append(f"    for (int i = 0; i < NX; ++i) x[i] = {_combination(method.b)};")
     return lines
 

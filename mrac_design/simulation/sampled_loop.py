@@ -75,7 +75,7 @@ def build_sampled_loop(
         raise ParameterError(
             "robot", robot.name, f"has other joints or force axes than {step.robot.name}"
         )
-    values = {
+    values: dict[str, ArrayLike] = {
         "inertia": inertial_parameters(robot),
         "stiffness": contact_stiffness(robot, stiffness),
         "controller": step.parameter_values,
@@ -197,8 +197,9 @@ def resting_start(
     check_posture(loop.dynamics, posture, condition_limit)
     n = loop.dynamics.description.joint_count
     still = np.zeros(n)
-    settled = step.resting_state(np.ravel(force))
-    _, torque, _ = step.step(settled, posture, still, force, force, step.parameter_values)
+    level, joints = readonly(np.ravel(force)), readonly(np.ravel(posture))
+    settled = step.resting_state(level)
+    _, torque, _ = step.step(settled, joints, still, level, level, step.parameter_values)
     layout = loop.system.held
     queue = layout.slices["pipeline"]
     memory: Mapping[str, ArrayLike] = {

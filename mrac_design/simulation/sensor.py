@@ -120,7 +120,7 @@ def gaussian_noise(
         if not 0 < value < math.inf:
             raise ParameterError(name, value, "must be a finite time > 0 s")
     count = math.ceil(duration / period - 1e-9)
-    breakpoints = np.arange(count + 1) * period
+    breakpoints = np.arange(count + 1, dtype=np.float64) * period
     breakpoints[-1] = duration
     samples = np.random.default_rng(seed).standard_normal((count, deviations.size))
     return PiecewisePolynomial(

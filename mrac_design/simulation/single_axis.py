@@ -151,7 +151,7 @@ def build_sampled_axis_loop(
     update = held.join(
         {
             "controller": following,
-            "pipeline": ca.vertcat(applied, memory["pipeline"][: int(delay)]),
+            "pipeline": ca.vertcat(applied, *ca.vertsplit(memory["pipeline"])[:-1]),
             "measured": measured,
             "signals": signal,
         }

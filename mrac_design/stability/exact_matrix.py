@@ -5,8 +5,8 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 import numpy as np
-from numpy.typing import NDArray
 from flint import fmpq, fmpq_mat
+from numpy.typing import NDArray
 
 from mrac_design.arrays import FloatArray
 

@@ -8,13 +8,14 @@ from flint import fmpq, fmpq_poly
 
 from mrac_design.errors import ParameterError
 from mrac_design.polynomials.rationals import Number, binary_rational, decimal_rational
-from mrac_design.polynomials.stable import is_hurwitz
+from mrac_design.polynomials.stable import is_hurwitz, is_schur
 from mrac_design.stability.positive_real import (
     PositiveRealness,
     positive_real,
     strictly_positive_real,
 )
 from mrac_design.stability.rational_function import RationalFunction, rational_function
+from mrac_design.time_domain import Continuous, TimeDomain
 from mrac_design.verdict import Verdict
 
 
@@ -36,7 +37,10 @@ class Factorisation:
     @property
     def second_stable(self) -> bool:
         """Whether every pole of G2 is strictly stable."""
-        return self.second is None or is_hurwitz(self.second.denominator)
+        if self.second is None:
+            return True
+        stable = is_hurwitz if isinstance(self.second.domain, Continuous) else is_schur
+        return stable(self.second.denominator)
 
     @property
     def usable(self) -> bool:
@@ -99,20 +103,24 @@ def factorisations(
         ("Ks/(p(p + K2)) · 1", (Ks * one, p * (p + K2)), (one, one)),
         ("(p + c)/Am", (p + c, Am), None),
     )
-    return FactorisationTable(rows=tuple(judged_splitting(*item) for item in splittings))
+    rows = (
+        judged_splitting(name, first, second, Continuous()) for name, first, second in splittings
+    )
+    return FactorisationTable(rows=tuple(rows))
 
 
 def judged_splitting(
     name: str,
     first: tuple[fmpq_poly, fmpq_poly],
     second: tuple[fmpq_poly, fmpq_poly] | None,
+    domain: TimeDomain,
 ) -> Factorisation:
     """A splitting from (numerator, denominator) pairs, with its verdicts."""
-    G1 = rational_function(*first)
+    G1 = rational_function(*first, domain)
     return Factorisation(
         name=name,
         first=G1,
-        second=None if second is None else rational_function(*second),
+        second=None if second is None else rational_function(*second, domain),
         positive=positive_real(G1),
         strict=strictly_positive_real(G1),
     )

@@ -51,12 +51,12 @@ def first_violated(hypotheses: Iterable[Hypothesis]) -> Hypothesis | None:
 def hypotheses_markdown(hypotheses: Iterable[Hypothesis]) -> str:
     """Markdown table of hypotheses."""
     rows = "\n".join(
-        f"| {_cell(item.name)} | {item.status.value} | {_cell(item.evidence)} |"
+        f"| {table_cell(item.name)} | {item.status.value} | {table_cell(item.evidence)} |"
         for item in hypotheses
     )
     return f"| hypothesis | status | evidence |\n|---|---|---|\n{rows}"
 
 
-def _cell(text: str) -> str:
+def table_cell(text: str) -> str:
     """Text with the bars escaped that would end a table cell."""
     return text.replace("|", "\\|")

@@ -157,11 +157,13 @@ def _sampled_vertex(
         *([command] if timing.delay else []),
         *(unit[4 + k] for k in range(timing.delay - 1)),
     ]
-    zero = [0] * (size - 2)
-    energy = exact_array([*input_matrix.tolist(), *([[0, 0]] * (size - 2))])
+    zero = [fmpq(0)] * (size - 2)
+    energy = np.vstack([input_matrix, exact_array([[0, 0]] * (size - 2))])
     return Vertex(
         A=np.array(rows, dtype=object),
-        disturbances=tuple(exact_array([[v] for v in (sign * q, p, *zero)]) for sign in (1, -1)),
+        disturbances=tuple(
+            exact_array([[sign * q], [p], *([v] for v in zero)]) for sign in (1, -1)
+        ),
         energy_input=energy,
         # Between samples the force is κ(ŷ + p(τ)Ẑ + q(τ)û), with q(τ) convex in p(τ).
         force=tuple(

@@ -6,13 +6,16 @@ answer of the solver can cost a certificate but cannot forge one.
 
 from __future__ import annotations
 
+import importlib
 import warnings
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 
 from mrac_design.arrays import FloatArray
+from mrac_design.errors import CertificateError
 
 Blocks = Callable[[FloatArray, float], Sequence[FloatArray]]
 """(P, scalar) -> blocks, jointly affine in both, that should be positive semidefinite."""
@@ -34,7 +37,7 @@ def widest_margin(blocks: Blocks, size: int, *, scalar: float = 0.0) -> Candidat
 
     `scalar` is handed to `blocks` unchanged.
     """
-    import cvxpy as cp
+    cp = _modelling()
 
     table = _coefficients(lambda P, _: blocks(P, scalar), size)
     x, t = cp.Variable(_unknowns(size)), cp.Variable()
@@ -52,7 +55,7 @@ def widest_margin(blocks: Blocks, size: int, *, scalar: float = 0.0) -> Candidat
 
 def least_scalar(blocks: Blocks, size: int) -> Candidate | None:
     """P and the least scalar that keep every block >= 0; None when the solver fails."""
-    import cvxpy as cp
+    cp = _modelling()
 
     table = _coefficients(blocks, size)
     x = cp.Variable(_unknowns(size) + 1)
@@ -64,18 +67,26 @@ def least_scalar(blocks: Blocks, size: int) -> Candidate | None:
     return Candidate(P=_matrix(x.value[:-1], size), scalar=float(x.value[-1]))
 
 
-def _solved(problem: object) -> bool:
+def _modelling() -> Any:
+    """cvxpy, loaded on first use: it is slow to load and only searching needs it."""
+    try:
+        return importlib.import_module("cvxpy")
+    except ModuleNotFoundError as error:
+        raise CertificateError("the search needs cvxpy and Clarabel (extra 'certify')") from error
+
+
+def _solved(problem: Any) -> bool:
     """Run Clarabel; its failures and its infeasibility are the same to us."""
-    import cvxpy as cp
+    cp = _modelling()
 
     try:
         with warnings.catch_warnings():
             # An inaccurate answer is welcome: what it is worth is decided exactly later.
             warnings.simplefilter("ignore", UserWarning)
-            problem.solve(solver=cp.CLARABEL)  # type: ignore[attr-defined]
+            problem.solve(solver=cp.CLARABEL)
     except cp.SolverError:
         return False
-    return problem.status in (cp.OPTIMAL, cp.OPTIMAL_INACCURATE)  # type: ignore[attr-defined]
+    return problem.status in (cp.OPTIMAL, cp.OPTIMAL_INACCURATE)
 
 
 def _coefficients(blocks: Blocks, size: int) -> list[tuple[int, FloatArray, FloatArray]]:

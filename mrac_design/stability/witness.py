@@ -13,8 +13,10 @@ rational, and the dissipation is positive because e_k > 0.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from math import comb
+from typing import Any
 
 from flint import acb, acb_poly, arb, ctx, fmpq, fmpq_mat, fmpq_poly
 
@@ -203,7 +205,8 @@ def _spectral_factor(target: fmpq_poly, precision: int) -> fmpq_poly:
         in_s[2 * k] = c if k % 2 == 0 else -c
     with ctx.workprec(precision):
         factor = acb_poly([acb(arb(target.leading_coefficient()).sqrt())])
-        for root, multiplicity in fmpq_poly(in_s).complex_roots() if len(in_s) > 1 else []:
+        roots: Sequence[Any] = fmpq_poly(in_s).complex_roots() if len(in_s) > 1 else ()
+        for root, multiplicity in roots:
             if root.real < 0:
                 factor *= acb_poly([-root, 1]) ** multiplicity
         return fmpq_poly([c.real.mid().fmpq() for c in factor.coeffs()])

@@ -58,15 +58,16 @@ def verify_certificate(path: Path | str) -> Report:
         Finding(found[pointer].line if pointer in found else 0, pointer, problem)
         for pointer, problem in broken_seals(found)
     ]
-    statements: list[str] = []
+    if findings:
+        # What is claimed is unclear once a value was altered, so nothing is decided about it.
+        return Report(tuple(sorted(findings, key=lambda f: (f.line, f.pointer))), ())
+    statements: tuple[str, ...] = ()
     try:
-        statements = list(_proved(Reader(document)))
+        statements = tuple(_proved(Reader(document)))
     except DocumentError as error:
         lines = [p.line for key, p in found.items() if key.startswith(error.pointer)]
         findings.append(Finding(min(lines, default=0), error.pointer, error.problem))
-    return Report(
-        tuple(sorted(set(findings), key=lambda f: (f.line, f.pointer))), tuple(statements)
-    )
+    return Report(tuple(findings), statements)
 
 
 def _proved(reader: Reader) -> Iterator[str]:
@@ -96,7 +97,7 @@ def _decide(reader: Reader, pointer: str, loop: Loop, polytope: list[Corner]) ->
     name = reader.value(f"{pointer}/claim")
     size = loop.size
     P = fmpq_mat(reader.matrix(f"{pointer}/P", size, size))
-    if P != P.transpose() or not _positive(P):
+    if P.transpose() != P or not _positive(P):
         raise DocumentError(f"{pointer}/P", "is not symmetric and positive definite")
     if name == "decay":
         rate = _positive_number(reader, f"{pointer}/rate")

@@ -62,7 +62,9 @@ class DesignView:
     tracking: Mapping[str, TrackingMetrics]
     """Figures of merit of each variant."""
 
-    def _repr_markdown_(self) -> str:
+    @property
+    def text(self) -> str:
+        """Margins and largest force errors in two sentences."""
         margins = self.design.margins()
         errors = ", ".join(
             f"{variant.title} {self.tracking[variant.name].max_force_error_percent:.3g} %"
@@ -73,6 +75,9 @@ class DesignView:
             f"{1e3 * margins.delay_margin:.3g} ms, crossover "
             f"{margins.crossover_frequency:.4g} rad/s. Largest force error: {errors}."
         )
+
+    def _repr_markdown_(self) -> str:
+        return self.text
 
 
 def initial_values(scenario: Scenario) -> DesignValues:
@@ -135,8 +140,8 @@ def view_figure(view: DesignView) -> CaptionedFigure:
 
 def _single_axis(values: DesignValues, scenario: Scenario) -> Scenario:
     steps = scenario.reference.steps[-1]
-    # The later steps of a long run come too late here: keep the levels, at half a second's start.
-    times = tuple(0.25 * DURATION * k for k in range(len(steps.times)))
+    # The scenario's levels, closer together: its own instants lie beyond the short run.
+    times = tuple(DURATION / 4 * k for k in range(len(steps.times)))
     return replace(
         scenario,
         stiffness=values.stiffness,
@@ -155,7 +160,7 @@ def _single_axis(values: DesignValues, scenario: Scenario) -> Scenario:
 
 @cache
 def _sliding_mass() -> RobotDynamics:
-    """A mass of 1 kg on a vertical slide without gravity: the simplest robot with one force axis."""
+    """A mass of 1 kg on a slide, without gravity: the simplest robot with one force axis."""
     slide = Joint(
         name="slide",
         type=JointType.PRISMATIC,

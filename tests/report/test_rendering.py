@@ -142,6 +142,27 @@ def test_failing_cell_is_one_clear_error_and_writes_nothing(tmp_path, scenario, 
     assert leftovers(tmp_path) == set()
 
 
+def test_failure_of_one_notebook_ends_the_others(tmp_path, scenario):
+    slow = write(tmp_path, "# %%\nimport time\ntime.sleep(60)\n")
+    broken = write(tmp_path, "# %%\n1 / 0\n", "02_stage.py")
+    begun = time.monotonic()
+    with pytest.raises(NotebookError, match=r"02_stage\.py: cell 1 .*ZeroDivisionError"):
+        render(tmp_path, scenario, [slow, broken])
+    assert time.monotonic() - begun < 30
+    assert leftovers(tmp_path) == set()
+
+
+@pytest.mark.skipif(sys.platform == "win32", reason="needs a POSIX script")
+def test_kernel_that_cannot_start_is_explained_in_its_own_words(tmp_path, scenario, monkeypatch):
+    python = tmp_path / "01_stage.py"
+    python.write_text("#!/bin/sh\necho no module named ipykernel >&2\nexit 1\n")
+    python.chmod(0o755)
+    monkeypatch.setattr(sys, "executable", str(python))
+    notebook = write(tmp_path, "# %%\n1\n", "02_stage.py")
+    with pytest.raises(NotebookError, match="did not start: no module named ipykernel"):
+        render(tmp_path, scenario, [notebook])
+
+
 def test_missing_notebook_is_named_before_anything_runs(tmp_path, scenario):
     with pytest.raises(NotebookError, match=r"absent\.py: no such notebook"):
         render(tmp_path, scenario, [write(tmp_path, "# %%\n1"), tmp_path / "absent.py"])

@@ -128,7 +128,7 @@ def active_observer(specification: ActiveObserver) -> LinearController:
         registers=registers,
         command=command,
         signals={"desired_force": reference.desired(ahead=0), "disturbance_estimate": estimate[2]},
-        rest={**{name: 0.0 for name in registers}, **rest, **REST},
+        rest={**dict.fromkeys(registers, 0.0), **rest, **REST},
     )
 
 

@@ -141,7 +141,7 @@ def build_linear_step(controller: LinearController) -> ControllerStep:
         name: _combination(rows, free[name], symbols[name], vector) for name, rows in tables.items()
     }
     following = {name: results[f"next_{name}"] for name in controller.following} | {
-        name: ca.vertcat(results[f"next_{name}"], state[name][:-1])
+        name: ca.vertcat(results[f"next_{name}"], *ca.vertsplit(state[name])[:-1])
         for name in controller.registers
     }
     signals = Layout(

@@ -38,19 +38,20 @@ class ReferenceRows:
 
     def desired(self, *, ahead: int) -> FloatArray:
         """Fd, `ahead` samples from now while the reference stays as it is, (columns,)."""
-        return self._ahead(ahead)[1]
+        return self.ahead(ahead)[1]
 
     def input(
         self, feedforward: ReferenceFeedforward, model: ReferenceModel, *, ahead: int
     ) -> FloatArray:
         """u_c = Fd + c1 Ḟd + c2 F̈d of a loop that answers like `model`, (columns,)."""
-        rate, desired = self._ahead(ahead)
+        rate, desired = self.ahead(ahead)
         c1, c2 = feedforward.weights(model)
         damping, stiffness = self.prefilter.polynomial[1:]
         acceleration = stiffness * (self.columns.reference - desired) - damping * rate
         return desired + c1 * rate + c2 * acceleration
 
-    def _ahead(self, count: int) -> FloatArray:
+    def ahead(self, count: int) -> FloatArray:
+        """Ḟd and Fd, `count` samples from now while the reference stays, (2, columns)."""
         rows = self.columns.block("prefilter")
         A, B = linear_advance(self.time_domain, *self._equations())
         for _ in range(count):

@@ -76,7 +76,9 @@ def integral_rst(specification: IntegralRST) -> LinearController:
     numerators = {"u": Ao - design.R, "y": -design.S, "c": design.T}
     # Observer form of (numerator)/Ao: direct part, and what is left over it feeds the states.
     A = np.array([[-Ao[1], 1.0], [-Ao[2], 0.0]])
-    B = np.column_stack([numerator[1:] - Ao[1:] * numerator[0] for numerator in numerators.values()])
+    B = np.column_stack(
+        [numerator[1:] - Ao[1:] * numerator[0] for numerator in numerators.values()]
+    )
     F, G = linear_advance(specification.time_domain, A, B)
     inputs = np.vstack([columns.applied, columns.force, command_input])
     following: FloatArray = F @ columns.block("observer") + G @ inputs

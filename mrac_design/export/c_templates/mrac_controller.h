@@ -5,7 +5,7 @@ $provenance
  *
  * Written by mrac_design $version. Gains hash $gains_hash.
  * Call mrac_init once, then mrac_step at every sample. Nothing is allocated, nothing is global
- * but constants; two controllers are two pairs of structs. SI units; joint efforts are N·m or N.
+ * but constants; two controllers are two pairs of structs. SI units; joint efforts are N m or N.
  */
 #ifndef MRAC_CONTROLLER_H
 #define MRAC_CONTROLLER_H
@@ -45,7 +45,7 @@ typedef struct {
 
 /* What a step gives. */
 typedef struct {
-    mrac_real torque[MRAC_JOINTS]; /* joint efforts within their limits, N·m or N */
+    mrac_real torque[MRAC_JOINTS]; /* joint efforts within their limits, N m or N */
 $signal_members
 } mrac_outputs;
 

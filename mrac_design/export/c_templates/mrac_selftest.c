@@ -1,7 +1,8 @@
 /* Self-test of the controller: exit status 0 when it computes what it should.
  *
  * The expected values were computed by CasADi's own machine in double precision when the package
- * was made, neither by this code nor by a compiler. $tolerance_comment
+ * was made, neither by this code nor by a compiler.
+$tolerance_comment
  *
  * With a number as argument, the sequence is repeated that often and timed.
  */

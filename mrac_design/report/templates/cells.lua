@@ -29,6 +29,24 @@ local function numberer(word)
   end
 end
 
+-- In the PDF a short table stays on one page; only a long one may break.
+local LONGEST_UNBROKEN = 24
+
+local function kept_together(tbl)
+  local rows = 0
+  for _, body in ipairs(tbl.bodies) do
+    rows = rows + #body.body
+  end
+  if FORMAT ~= "typst" or rows > LONGEST_UNBROKEN then
+    return nil
+  end
+  return {
+    pandoc.RawBlock("typst", "#block(breakable: false, width: 100%)["),
+    tbl,
+    pandoc.RawBlock("typst", "]"),
+  }
+end
+
 return {
   {
     traverse = "topdown",
@@ -36,4 +54,5 @@ return {
     Figure = numberer("Figure"),
     Table = numberer("Table"),
   },
+  { Table = kept_together },
 }

@@ -1,0 +1,83 @@
+"""`mrac certify` and `mrac verify`: certificates of the adaptive loop, made and re-checked."""
+
+from __future__ import annotations
+
+import sys
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from mrac_design.cli_options import DesignOptions, takes
+
+
+@takes(DesignOptions)
+def certify(
+    options: DesignOptions,
+    out: Annotated[Path, typer.Option(help="Where the certificate goes.")] = Path(
+        "certificate.json"
+    ),
+    box: Annotated[
+        str | None,
+        typer.Option(help="Share the gains may leave nominal by, as 0.4; without: the largest."),
+    ] = None,
+    softest: Annotated[str | None, typer.Option(help="Least tissue stiffness (N/m).")] = None,
+    stiffest: Annotated[str | None, typer.Option(help="Greatest tissue stiffness (N/m).")] = None,
+    rate: Annotated[
+        int | None, typer.Option(help="Sample rate (Hz); without: continuous time.")
+    ] = None,
+    delay: Annotated[int, typer.Option(help="Computational delay, whole samples.")] = 1,
+) -> None:
+    """Prove the loop stable for every path of its gains inside a box, and keep the proof.
+
+    Example: mrac certify --box 0.4 --softest 800 --stiffest 1200 --out certificate.json
+
+    Exit status: 0 when proved, 1 when not (nothing is written then).
+    """
+    from mrac_design.stability.adaptive_loop import adaptive_loop, relative_box
+    from mrac_design.stability.certificate_file import write_certificate
+    from mrac_design.stability.certification import certify as prove
+    from mrac_design.stability.certification import largest_box
+    from mrac_design.stability.sampled_loop import sampling
+    from mrac_design.study import scenario_design
+    from mrac_design.time_domain import Continuous
+    from mrac_design.verdict import Verdict
+
+    scenario = options.chosen()
+    design, choice = scenario_design(scenario), scenario.design
+    loop = adaptive_loop(
+        design_stiffness=choice.stiffness,
+        velocity_gain=choice.velocity_gain,
+        bandwidth=choice.bandwidth,
+        observer_pole=choice.observer_pole,
+        gains=tuple(design.parameters[:3]),
+    )
+    timing = Continuous() if rate is None else sampling(f"1/{rate}", delay)
+    tissue = (softest or choice.stiffness, stiffest or choice.stiffness)
+    if box is None:
+        fraction = largest_box(loop, tissue, timing, resolution="0.01").fraction
+    else:
+        fraction = box
+    certificate = prove(loop, relative_box(loop, fraction, tissue), timing)
+    if certificate.verdict is not Verdict.PROVED:
+        typer.echo(f"{certificate.verdict.value}: {certificate.reason}", err=True)
+        raise typer.Exit(1)
+    write_certificate(certificate, out)
+    typer.echo(f"proved, gains within ±{100 * float(fraction):g} %: {certificate.reason}")
+    typer.echo(f"decay rate {certificate.decay_rate:.4g} 1/s")
+    typer.echo(f"peak gain, heart acceleration to force: {certificate.peak_gain:.4g} N/(m/s²)")
+    typer.echo(f"certificate: {out}")
+
+
+def verify(
+    certificate: Annotated[Path, typer.Argument(help="A certificate.json.")],
+) -> None:
+    """Re-check a certificate in exact arithmetic, without designer or solver.
+
+    Example: mrac verify certificate.json
+
+    Exit status: 0 accepted, 1 refused (the failing line is named), 2 not readable.
+    """
+    from mrac_design.verify.__main__ import main
+
+    sys.exit(main([str(certificate)]))

@@ -1,0 +1,190 @@
+"""Tuned gains as a value: all that the controller of a force axis is made from, and nothing else.
+
+    scenario, design ─► gain_set ─► GainSet ─► controller_of ─► build_step
+                                      │  ▲
+                                documents and files
+
+Whatever way a `GainSet` has travelled, the step built from it has the same parameters bit for bit.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import math
+from dataclasses import dataclass, field, replace
+from importlib.metadata import version
+from pathlib import Path
+
+import numpy as np
+
+from mrac_design.controller.adaptation import AdaptationLaw
+from mrac_design.controller.adaptive import AdaptiveRST, build_step
+from mrac_design.controller.linearisation import RobotModelError, build_linearisation
+from mrac_design.controller.reference import DirectReference, ModelInverse
+from mrac_design.controller.robot_step import RobotStep, build_robot_step
+from mrac_design.design import PolynomialDesign, ReferenceModel, RSTDesign, RSTSpecification
+from mrac_design.design.polynomial_design import rounded_design
+from mrac_design.design.rst import design_rst
+from mrac_design.errors import ModelFileError, ParameterError
+from mrac_design.polynomials.diophantine import RESIDUAL_LIMIT
+from mrac_design.polynomials.rationals import binary_polynomial
+from mrac_design.resources import models_directory
+from mrac_design.robot import available_robots, build_dynamics, load_robot
+from mrac_design.simulation.scenario import Scenario
+from mrac_design.study import VARIANTS, Variant, variant_controller
+from mrac_design.time_domain import Discrete, TimeDomain
+
+COEFFICIENT_NAMES = ("r1", "s0", "s1", "t0", "t1")
+"""Entries of `GainSet.coefficients`, in order."""
+
+# T follows from Ao by one product; another processor may round it otherwise.
+_T_TOLERANCE = 1e-12
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class RobotFingerprint:
+    """Which robot file the gains were made for."""
+
+    file: str
+    """Name of the robot file, without its folder."""
+    sha256: str
+    """SHA-256 of the file's bytes, hexadecimal."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class GainSet:
+    """A tuned controller, the same on every force axis; compares by value.
+
+    Raises ParameterError when a number is out of its range, IllConditionedError when the
+    coefficients do not solve the Diophantine equation of the specification.
+    """
+
+    scenario: str
+    """Name of the scenario the gains come from."""
+    package_version: str
+    """Version of mrac_design that made them."""
+    robot: RobotFingerprint
+    """The robot file they were made for."""
+    specification: RSTSpecification
+    """Plant (Ks, K2), reference model (ω, ξ) and observer pole ao."""
+    coefficients: tuple[float, ...]
+    """(r1, s0, s1, t0, t1) of R = p + r1, S = s0 p + s1, T = t0 p + t1, SI units."""
+    initial_gains: tuple[float, ...]
+    """θ̂(0), scaled start of (r1 − ao, s0, s1, t0, t1), dimensionless."""
+    prefilter: ReferenceModel | None
+    """Pre-filter of the force reference; none: F_d = r."""
+    feedforward: DirectReference | ModelInverse
+    """What enters the loop as u_c."""
+    law: AdaptationLaw
+    """How the gains move."""
+    bias_force: float
+    """Size of the constant regressor (N); 0 leaves it out."""
+    tool_axis_bandwidth: float
+    """Bandwidth of the PD control of the tool axis (rad/s)."""
+    robot_model: RobotModelError
+    """Factors on the robot file's numbers in the linearising torque."""
+    design: RSTDesign = field(init=False, compare=False, repr=False)
+    """The design with exactly these coefficients, its residual evaluated at them."""
+
+    def __post_init__(self) -> None:
+        if len(self.coefficients) != 5 or not np.all(np.isfinite(self.coefficients)):
+            raise ParameterError("gains", self.coefficients, "needs five finite numbers")
+        if not 0 < self.tool_axis_bandwidth < math.inf:
+            raise ParameterError("tool_axis_bandwidth", self.tool_axis_bandwidth, "must be > 0")
+        object.__setattr__(self, "design", _design(self.specification, self.coefficients))
+
+    def _repr_markdown_(self) -> str:
+        return self.design._repr_markdown_()
+
+
+def gain_set(scenario: Scenario, design: RSTDesign, variant: Variant = VARIANTS[-1]) -> GainSet:
+    """The gains of one of a study's controllers, by default the adaptive one with model inverse.
+
+    Raises ModelFileError when the scenario's robot file cannot be read.
+    """
+    controller = variant_controller(scenario, design, variant)
+    feedforward = controller.feedforward
+    assert isinstance(feedforward, DirectReference | ModelInverse)
+    return GainSet(
+        scenario=scenario.name,
+        package_version=version("mrac-design"),
+        robot=robot_fingerprint(scenario.robot),
+        specification=design.specification,
+        coefficients=tuple(getattr(design, name) for name in COEFFICIENT_NAMES),
+        initial_gains=controller.initial_gains,
+        prefilter=controller.prefilter,
+        feedforward=feedforward,
+        law=controller.law,
+        bias_force=controller.bias_force,
+        tool_axis_bandwidth=scenario.design.tool_axis_bandwidth,
+        robot_model=scenario.model_error,
+    )
+
+
+def controller_of(gains: GainSet, time_domain: TimeDomain) -> AdaptiveRST:
+    """The controller of one force axis, for `build_step`, continuous or sampled."""
+    return AdaptiveRST(
+        design=gains.design,
+        prefilter=gains.prefilter,
+        law=gains.law,
+        feedforward=gains.feedforward,
+        bias_force=gains.bias_force,
+        initial_gains=gains.initial_gains,
+        time_domain=time_domain,
+    )
+
+
+def robot_step_of(gains: GainSet, robot: str, time_domain: Discrete) -> RobotStep:
+    """The whole robot's controller: these gains on every force axis of `robot`.
+
+    `robot` is a packaged robot or a robot file. Raises ModelFileError when it is not the file
+    the gains were made for.
+    """
+    found = robot_fingerprint(robot)
+    if found.sha256 != gains.robot.sha256:
+        raise ModelFileError(
+            robot,
+            "",
+            f"is not the robot the gains were made for: SHA-256 {found.sha256[:12]}… instead of "
+            f"{gains.robot.sha256[:12]}… ({gains.robot.file}); give that file, or design anew",
+        )
+    dynamics = build_dynamics(load_robot(robot))
+    linearisation = build_linearisation(
+        dynamics,
+        velocity_gain=gains.specification.plant.velocity_gain,
+        tool_axis_bandwidth=gains.tool_axis_bandwidth,
+        model_error=gains.robot_model,
+    )
+    step = build_step(controller_of(gains, time_domain))
+    axes = len(dynamics.description.force_axes)
+    return build_robot_step(dynamics, linearisation, [step] * axes, time_domain=time_domain)
+
+
+def robot_fingerprint(robot: str) -> RobotFingerprint:
+    """Fingerprint of a packaged robot or a robot file; raises ModelFileError if unreadable."""
+    path = Path(robot)
+    if robot in available_robots():
+        path = models_directory() / "robots" / f"{robot}.toml"
+    try:
+        content = path.read_bytes()
+    except OSError as problem:
+        raise ModelFileError(path, "", f"cannot be read: {problem.strerror}") from problem
+    return RobotFingerprint(file=path.name, sha256=hashlib.sha256(content).hexdigest())
+
+
+def _design(specification: RSTSpecification, coefficients: tuple[float, ...]) -> RSTDesign:
+    """The design of `specification` with the given coefficients put in and judged."""
+    r1, s0, s1, t0, t1 = coefficients
+    solved = design_rst(specification).solved
+    placed: PolynomialDesign = rounded_design(
+        solved,
+        R=binary_polynomial([1.0, r1]),
+        S=binary_polynomial([s0, s1]),
+        residual_limit=RESIDUAL_LIMIT,
+    )
+    T = np.array([t0, t1])
+    if not np.allclose(T, solved.T, rtol=_T_TOLERANCE, atol=0.0):
+        wanted = ", ".join(f"{value:.9g}" for value in solved.T)
+        raise ParameterError("t0, t1", (t0, t1), f"must be ω²/b0 times Ao: {wanted}")
+    T.setflags(write=False)
+    return RSTDesign(specification=specification, solved=replace(placed, T=T))
