@@ -5,8 +5,8 @@ from __future__ import annotations
 import math
 from collections.abc import Iterable
 from dataclasses import dataclass
+from typing import TYPE_CHECKING
 
-import control
 import numpy as np
 from flint import fmpq_poly
 
@@ -19,6 +19,10 @@ from mrac_design.polynomials.rationals import (
     polynomial_latex,
 )
 from mrac_design.time_domain import Continuous, TimeDomain, time_domain_of
+from mrac_design.transfer import transfer_function
+
+if TYPE_CHECKING:
+    import control
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -71,9 +75,7 @@ class Process:
 
     def transfer_function(self) -> control.TransferFunction:
         """B/A for python-control."""
-        return control.TransferFunction(
-            coefficients(self.B), coefficients(self.A), dt=self.domain.dt
-        )
+        return transfer_function(coefficients(self.B), coefficients(self.A), dt=self.domain.dt)
 
     def _repr_latex_(self) -> str:
         variable = self.domain.variable
@@ -145,7 +147,7 @@ class ForcePlant:
 
     def transfer_function(self) -> control.TransferFunction:
         """Ks/(p(p + K2)) for python-control, from the command u (m/s²) to the force (N)."""
-        return control.TransferFunction([self.b0], self.A)
+        return transfer_function([self.b0], self.A)
 
     def _repr_latex_(self) -> str:
         return f"$G(p) = \\dfrac{{{self.b0:.6g}}}{{p\\,(p + {self.velocity_gain:.6g})}}$"

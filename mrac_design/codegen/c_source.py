@@ -10,7 +10,7 @@ from collections.abc import Sequence
 
 import casadi as ca
 
-from mrac_design.codegen.straight_line import CONSTANT, INPUT, StraightLine
+from mrac_design.codegen.straight_line import CONSTANT, FMA, FMS, FNMA, INPUT, StraightLine
 
 OPERATORS = {
     ca.OP_ADD: "{0} + {1}",
@@ -30,6 +30,9 @@ OPERATORS = {
     ca.OP_IF_ELSE_ZERO: "real_if({0} != 0.0, {1})",
     ca.OP_SIGN: "real_where({0} > 0.0) - real_where({0} < 0.0)",
     ca.OP_FABS: "real_max({0}, -{0})",
+    FMA: "real_fma({0}, {1}, {2})",
+    FMS: "real_fma({0}, {1}, -{2})",
+    FNMA: "real_fma(-{0}, {1}, {2})",
 }
 _MIX = (ca.OP_ADD, ca.OP_SUB, ca.OP_MUL, ca.OP_DIV, ca.OP_NEG)
 """Operators that take a vector and a number."""
@@ -51,10 +54,18 @@ typedef double real;
 #define real_any(condition) (condition)
 #define real_call1(function, a) function(a)
 #define real_call2(function, a, b) function(a, b)
+#if defined(__FMA__) || defined(__ARM_FEATURE_FMA)
+static inline double real_fma(double a, double b, double c) { return __builtin_fma(a, b, c); }
+#else
+static inline double real_fma(double a, double b, double c) { return a * b + c; }
+#endif
 static inline double real_min(double a, double b) { return a < b ? a : b; }
 static inline double real_max(double a, double b) { return a > b ? a : b; }
 """
 _VECTOR = """\
+#if defined(__AVX2__)
+#include <immintrin.h>
+#endif
 typedef double real __attribute__((vector_size(LANES * sizeof(double))));
 typedef long long mask __attribute__((vector_size(LANES * sizeof(double))));
 #define splat(x) ((real){0.0} + (x))
@@ -68,6 +79,26 @@ static inline real real_max(real a, real b) {
     const mask c = a > b;
     return (real)((c & (mask)a) | (~c & (mask)b));
 }
+#if defined(__AVX512F__)
+static inline real real_fma(real a, real b, real c) {
+    return (real)_mm512_fmadd_pd((__m512d)a, (__m512d)b, (__m512d)c);
+}
+#elif defined(__AVX2__) && defined(__FMA__)
+static inline real real_fma(real a, real b, real c) {
+    union { real all; __m256d half[2]; } x = { a }, y = { b }, z = { c };
+    z.half[0] = _mm256_fmadd_pd(x.half[0], y.half[0], z.half[0]);
+    z.half[1] = _mm256_fmadd_pd(x.half[1], y.half[1], z.half[1]);
+    return z.all;
+}
+#elif defined(__ARM_FEATURE_FMA)
+static inline real real_fma(real a, real b, real c) {
+    real r;
+    for (int l = 0; l < LANES; ++l) r[l] = __builtin_fma(a[l], b[l], c[l]);
+    return r;
+}
+#else
+static inline real real_fma(real a, real b, real c) { return a * b + c; }
+#endif
 static inline int real_any(mask c) {
     long long any = 0;
     for (int l = 0; l < LANES; ++l) any |= c[l];
@@ -87,10 +118,9 @@ static inline real real_call2(double (*function)(double, double), real a, real b
 
 
 def support(lanes: int) -> str:
-    """Definitions the functions need, for one number or `lanes` numbers at once."""
-    if lanes == 1:
-        return "enum { LANES = 1 };\n" + _SCALAR
-    return f"enum {{ LANES = {lanes} }};\n" + _VECTOR
+    """Definitions the functions need, for one number (`lanes` 1) or eight at once (8)."""
+    assert lanes in (1, 8)
+    return f"enum {{ LANES = {lanes} }};\n" + (_SCALAR if lanes == 1 else _VECTOR)
 
 
 def c_routine(program: StraightLine, name: str, *, inputs: Sequence[str] | None = None) -> str:

@@ -2,16 +2,23 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 
 import casadi as ca
 
-from mrac_design.codegen.straight_line import CONSTANT, INPUT, StraightLine
+from mrac_design.codegen.straight_line import CONSTANT, FMA, FMS, FNMA, INPUT, StraightLine
+
+
+_FUSED: dict[int, Callable[[ca.SX, ca.SX], ca.SX]] = {
+    FMA: lambda product, c: product + c,
+    FMS: lambda product, c: product - c,
+    FNMA: lambda product, c: c - product,
+}
 
 
 def casadi_function(program: StraightLine, name: str) -> ca.Function:
-    """An SX function with exactly the program's operations, in its order."""
+    """An SX function with the program's operations in its order; fused ones are rounded twice."""
     arguments = [ca.SX.sym(argument, length) for argument, length in program.inputs]
     entries = [ca.vertsplit(argument) if argument.numel() else [] for argument in arguments]
     values: list[ca.SX] = []
@@ -22,6 +29,9 @@ def casadi_function(program: StraightLine, name: str) -> ca.Function:
                 values.append(entries[operands[0]][operands[1]])
             elif operation == CONSTANT:
                 values.append(ca.SX(value))
+            elif operation in _FUSED:
+                product = values[operands[0]] * values[operands[1]]
+                values.append(_FUSED[operation](product, values[operands[2]]))
             elif len(operands) == 1:
                 values.append(ca.SX.unary(operation, values[operands[0]]))
             else:

@@ -10,9 +10,12 @@ from typing import NamedTuple
 import casadi as ca
 
 INPUT, CONSTANT = ca.OP_INPUT, ca.OP_CONST
+FMA, FMS, FNMA = 1001, 1002, 1003
+"""a b + c, a b − c and c − a b rounded once; CasADi has no numbers for them."""
 _FREE = (INPUT, CONSTANT, ca.OP_OUTPUT, ca.OP_NEG, ca.OP_ASSIGN)
 _SUMS = (ca.OP_ADD, ca.OP_SUB, ca.OP_TWICE)
-_PRODUCTS = (ca.OP_MUL, ca.OP_SQ)
+_FUSED = (FMA, FMS, FNMA)
+_PRODUCTS = (ca.OP_MUL, ca.OP_SQ, *_FUSED)
 _QUOTIENTS = (ca.OP_DIV, ca.OP_INV)
 _SELECTIONS = (
     ca.OP_FMIN, ca.OP_FMAX, ca.OP_LT, ca.OP_LE, ca.OP_EQ, ca.OP_NE, ca.OP_AND, ca.OP_OR,
@@ -71,7 +74,7 @@ def count_operations(operations: Iterable[int]) -> OperationCount:
     ]
     sums, products, quotients, selections = kinds
     return OperationCount(
-        sums=sums,
+        sums=sums + sum(operation in _FUSED for operation in counted),
         products=products,
         quotients=quotients,
         functions=len(counted) - sum(kinds),

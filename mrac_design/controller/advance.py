@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import casadi as ca
 import numpy as np
-from scipy.linalg import expm
 
 from mrac_design.arrays import FloatArray, readonly
 from mrac_design.time_domain import Discrete, TimeDomain
@@ -20,6 +19,8 @@ def linear_advance(
     """
     if not isinstance(domain, Discrete):
         return readonly(A), readonly(B)
+    from scipy.linalg import expm  # a quarter of a second that continuous controllers can save
+
     n, m = B.shape
     block = np.zeros((n + m, n + m))
     block[:n, :n], block[:n, n:] = A, B

@@ -14,8 +14,8 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from enum import Enum
+from typing import TYPE_CHECKING
 
-import control
 from flint import fmpq, fmpq_poly
 
 from mrac_design.arrays import FloatArray, readonly
@@ -29,6 +29,10 @@ from mrac_design.polynomials.rationals import (
     roots,
 )
 from mrac_design.time_domain import Continuous
+from mrac_design.transfer import transfer_function
+
+if TYPE_CHECKING:
+    import control
 
 
 class MeasuredSignal(Enum):
@@ -159,7 +163,7 @@ class ErrorModel:
     def transfer_function(self) -> control.TransferFunction:
         """G for python-control."""
         numerator, denominator = self.transfer
-        return control.TransferFunction(coefficients(numerator), coefficients(denominator))
+        return transfer_function(coefficients(numerator), coefficients(denominator))
 
     @property
     def relative_degree(self) -> int:

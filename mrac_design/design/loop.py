@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import TYPE_CHECKING
 
-import control
 import numpy as np
 from flint import fmpq_poly
 from numpy.typing import NDArray
@@ -13,6 +13,10 @@ from mrac_design.design.margins import StabilityMargins, stability_margins
 from mrac_design.design.region import is_stable
 from mrac_design.plant import Process
 from mrac_design.polynomials.rationals import coefficients, roots
+from mrac_design.transfer import transfer_function
+
+if TYPE_CHECKING:
+    import control
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -86,7 +90,7 @@ class FeedbackLoop:
 
     def _ratio(self, numerator: fmpq_poly, denominator: fmpq_poly) -> control.TransferFunction:
         if numerator.is_zero():
-            return control.TransferFunction([0.0], [1.0], dt=self.process.domain.dt)
-        return control.TransferFunction(
+            return transfer_function([0.0], [1.0], dt=self.process.domain.dt)
+        return transfer_function(
             coefficients(numerator), coefficients(denominator), dt=self.process.domain.dt
         )

@@ -4,14 +4,18 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
+from typing import TYPE_CHECKING
 
-import control
 import numpy as np
 from flint import fmpq_poly
 
 from mrac_design.arrays import FloatArray
 from mrac_design.errors import ParameterError
 from mrac_design.polynomials.rationals import coefficients, decimal_rational
+from mrac_design.transfer import transfer_function
+
+if TYPE_CHECKING:
+    import control
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -70,7 +74,7 @@ class ReferenceModel:
     def transfer_function(self) -> control.TransferFunction:
         """ω²/Am for python-control."""
         Am = self.polynomial
-        return control.TransferFunction([Am[-1]], Am)
+        return transfer_function([Am[-1]], Am)
 
     def _repr_latex_(self) -> str:
         _, first, last = self.polynomial

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
+from typing import TYPE_CHECKING
 
-import control
 import numpy as np
 from flint import fmpq_poly
 from numpy.typing import NDArray
@@ -26,6 +26,9 @@ from mrac_design.errors import ParameterError
 from mrac_design.plant import ForcePlant
 from mrac_design.polynomials.diophantine import RESIDUAL_LIMIT, SylvesterSystem
 from mrac_design.polynomials.rationals import decimal_rational
+
+if TYPE_CHECKING:
+    import control
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

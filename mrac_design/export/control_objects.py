@@ -9,12 +9,14 @@ The adaptive controller is a nonlinear system; its parameters are those of the s
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
 from dataclasses import dataclass, replace
 from typing import Any
 
 import casadi as ca
 import control
 import numpy as np
+from flint import fmpq
 
 from mrac_design.arrays import FloatArray
 from mrac_design.controller.adaptive import build_step
@@ -25,6 +27,9 @@ from mrac_design.export.gain_set import GainSet, controller_of
 from mrac_design.plant import ForcePlant
 from mrac_design.polynomials.rationals import decimal_rational, nearest_float
 from mrac_design.time_domain import TimeDomain
+
+_NEIGHBOURS = 3
+"""How many floats to either side rounding can have led astray."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -62,8 +67,8 @@ def redesigned(gains: GainSet, pieces: LoopPieces) -> GainSet:
     """`gains` with design and coefficients taken from python-control's transfer functions.
 
     The adapted gains start from the new design's own if they started from the old one's. With
-    `loop_pieces(gains)` unchanged it gives `gains` again, exactly for dampings of up to 15
-    digits: a polynomial holds only the product of damping and bandwidth. Raises ParameterError
+    `loop_pieces(gains)` unchanged it gives `gains` again, exactly for ω and ξ of up to 15
+    digits: a polynomial holds only ω² and 2ξω, rounded. Raises ParameterError
     for pieces of other shapes, IllConditionedError when S/R and T/R do not place the poles.
     """
     model = _model(pieces.reference_model)
@@ -154,21 +159,25 @@ def _ratio(name: str, system: control.TransferFunction) -> tuple[FloatArray, Flo
 
 
 def _model(system: control.TransferFunction) -> ReferenceModel:
-    """The model a transfer function is; of all dampings it could have, the one written shortest."""
+    """The model a transfer function is; of all that round to it, the one written shortest."""
     rough = ReferenceModel.from_transfer_function(system)
-    wanted = float(system.den[0][0][1] / system.den[0][0][0])
-    omega = decimal_rational(rough.bandwidth)
-
-    def fits(damping: float) -> bool:
-        return nearest_float(2 * decimal_rational(damping) * omega) == wanted
-
-    candidates = [rough.damping]
-    for direction in (0.0, math.inf):
-        value = rough.damping
-        for _ in range(2):
-            value = math.nextafter(value, direction)
-            candidates.append(value)
-    best = min(
-        (c for c in candidates if fits(c)), key=lambda c: len(repr(c)), default=rough.damping
+    leading, first, last = (float(value) for value in system.den[0][0])
+    omega = _shortest(rough.bandwidth, lambda value: value * value, last / leading)
+    return ReferenceModel(
+        bandwidth=nearest_float(omega),
+        damping=nearest_float(
+            _shortest(rough.damping, lambda value: 2 * value * omega, first / leading)
+        ),
     )
-    return ReferenceModel(bandwidth=rough.bandwidth, damping=best)
+
+
+def _shortest(rough: float, image: Callable[[fmpq], fmpq], wanted: float) -> fmpq:
+    """Of the few floats about `rough` whose image rounds to `wanted`, the shortest decimal."""
+    near = [rough]
+    for direction in (0.0, math.inf):
+        value = rough
+        for _ in range(_NEIGHBOURS):
+            value = math.nextafter(value, direction)
+            near.append(value)
+    fitting = [value for value in near if nearest_float(image(decimal_rational(value))) == wanted]
+    return decimal_rational(min(fitting, key=lambda value: len(repr(value)), default=rough))

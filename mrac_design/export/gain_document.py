@@ -28,7 +28,10 @@ FORMAT = "mrac_design gains 2"
 COEFFICIENT_UNITS = ("1/s", "m/(N·s²)", "m/(N·s³)", "m/(N·s²)", "m/(N·s³)")
 """Units of r1, s0, s1, t0, t1."""
 
-_FEEDFORWARDS = {"direct": DirectReference(), "model_inverse": ModelInverse()}
+_FEEDFORWARDS: Mapping[str, DirectReference | ModelInverse] = {
+    "direct": DirectReference(),
+    "model_inverse": ModelInverse(),
+}
 
 
 def gains_schema_path() -> Path:

@@ -20,7 +20,7 @@ import tomli_w
 from mrac_design.errors import GainFileError, ParameterError
 from mrac_design.export.gain_document import document_of, gains_of
 from mrac_design.export.gain_set import GainSet
-from mrac_design.publishing import publish_file, staging_folder
+from mrac_design.export.writing import written_whole
 
 _MATLAB_NAME = "mrac_gains"
 
@@ -41,13 +41,11 @@ def write_gains(gains: GainSet, path: Path) -> None:
     """Write gains in the format of the file's suffix: .json, .toml, .yaml, .yml or .mat.
 
     The file appears whole or not at all. Raises ParameterError for another suffix or a law that
-    has no form in a file, OSError when the file cannot be written.
+    has no form in a file, FileError when the file cannot be written.
     """
     content = _format(path).encode(document_of(gains))
-    with staging_folder(path) as folder:
-        staged = folder / path.name
+    with written_whole(path) as staged:
         staged.write_bytes(content)
-        publish_file(staged, path)
 
 
 def read_gains(path: Path) -> GainSet:
@@ -147,7 +145,7 @@ def _from_ros(content: bytes) -> Any:
             "is YAML, and PyYAML is not installed: pip install 'mrac-design[interop]'"
         ) from problem
 
-    class UniqueKeys(yaml.SafeLoader):  # type: ignore[misc]
+    class UniqueKeys(yaml.SafeLoader):
         def construct_mapping(self, node: Any, deep: bool = False) -> dict[Any, Any]:
             names = [self.construct_object(key, deep=True) for key, _ in node.value]
             twice = [name for name in names if names.count(name) > 1]

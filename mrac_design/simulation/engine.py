@@ -11,14 +11,13 @@ import numpy as np
 
 from mrac_design.arrays import FloatArray
 from mrac_design.codegen.machine import casadi_function
-from mrac_design.codegen.trigonometry import lower_trigonometry
 from mrac_design.errors import CompilationError
 from mrac_design.simulation.compilation import compile_library, find_compiler
 from mrac_design.simulation.emission import simplified
 from mrac_design.simulation.method import Method
 from mrac_design.simulation.program import c_program
 from mrac_design.simulation.schedule import Schedule
-from mrac_design.simulation.stepping import prepare, step_program
+from mrac_design.simulation.stepping import finished, prepare, step_program
 from mrac_design.simulation.system import HybridSystem
 
 _LOG = logging.getLogger(__name__)
@@ -119,7 +118,7 @@ class InterpretedEngine:
         rate, output = prepare(system.rate), prepare(system.output)
         self._rate_setup = casadi_function(rate.setup, "rate_setup")
         self._output_setup = casadi_function(output.setup, "output_setup")
-        self._output = casadi_function(lower_trigonometry(output.body), "output")
+        self._output = casadi_function(finished(output.body), "output")
         self._update = simplified(system.update) if system.update is not None else None
         self._step = casadi_function(step_program(system, rate, method, input_powers), "step")
 

@@ -6,10 +6,9 @@ import casadi as ca
 import numpy as np
 
 from mrac_design.codegen.c_source import c_routine, support
-from mrac_design.codegen.trigonometry import lower_trigonometry
 from mrac_design.simulation.emission import c_function, simplified
 from mrac_design.simulation.method import Method
-from mrac_design.simulation.stepping import ARGUMENTS, Prepared, prepare, step_program
+from mrac_design.simulation.stepping import ARGUMENTS, Prepared, finished, prepare, step_program
 from mrac_design.simulation.system import HybridSystem
 from mrac_design.simulation.tableau import ButcherTableau
 
@@ -24,7 +23,9 @@ _TEMPLATE = """\
 {support}
 enum {{
     NX = {states}, NZ = {held}, NV = {inputs}, NY = {outputs}, NP = {parameters},
-    POWERS = {powers}, PREPARED = {prepared}, READY = {ready}
+    POWERS = {powers}, PREPARED = {prepared}, READY = {ready}, STAGES = {stages},
+    /* Whole vectors of numbers, so that the compiler needs no loop for the rest. */
+    WIDTH = LANES > 1 ? NX : (NX + 7) / 8 * 8
 }};
 
 {functions}
@@ -79,11 +80,15 @@ static void restore_denormals(unsigned before)
 /* Runs n intervals; returns how many of them began with a record. */
 long run(long n, const double *start, const double *length, const long long *substeps,
          const long long *segment, const double *offset, const unsigned char *records,
-         const unsigned char *updates, const real *coefficients, const real *p, real *x, real *z,
-         real *recorded)
+         const unsigned char *updates, const real *coefficients, const real *p, real *state,
+         real *z, real *recorded)
 {{
     const unsigned before = flush_denormals();
     real v[NV + 1], prepared[PREPARED + 1], ready[READY + 1];
+    real x[WIDTH + 1], y[WIDTH + 1], k[STAGES][WIDTH + 1];
+    memset(x, 0, sizeof x);
+    memset(k, 0, sizeof k);
+    memcpy(x, state, NX * sizeof *x);
     long rows = 0;
     rate_setup(p, prepared);
     record_setup(p, ready);
@@ -97,8 +102,9 @@ long run(long n, const double *start, const double *length, const long long *sub
         }}
         const double h = length[i] / (double)substeps[i];
         for (long long j = 0; j < substeps[i]; ++j)
-            step(x, z, c, p, prepared, offset[i] + (double)j * h, h);
+            step(x, z, c, p, prepared, offset[i] + (double)j * h, h, k, y);
     }}
+    memcpy(state, x, NX * sizeof *x);
     restore_denormals(before);
     return rows;
 }}
@@ -107,9 +113,10 @@ long run(long n, const double *start, const double *length, const long long *sub
 _RUNGE_KUTTA = """\
 /* One step of the {name} method from time s within the segment. */
 static void step(real *restrict x, const real *restrict z, const real *restrict segment,
-                 const real *restrict p, const real *restrict prepared, double s, double h)
+                 const real *restrict p, const real *restrict prepared, double s, double h,
+                 real (*restrict k)[WIDTH + 1], real *restrict y)
 {{
-    real k[{stages}][NX + 1], y[NX + 1], v[NV + 1];
+    real v[NV + 1];
 {code}
 }}
 """
@@ -117,9 +124,11 @@ static void step(real *restrict x, const real *restrict z, const real *restrict 
 _SERIES = """\
 /* From time s within the segment over h, in as many steps of the {name} as its error asks for. */
 static void step(real *restrict x, const real *restrict z, const real *restrict segment,
-                 const real *restrict p, const real *restrict prepared, double s, double h)
+                 const real *restrict p, const real *restrict prepared, double s, double h,
+                 real (*restrict k)[WIDTH + 1], real *restrict y)
 {{
-    real following[NX + 1], used, time = splat(s), rest = splat(h);
+    (void)k;
+    real *following = y, used, time = splat(s), rest = splat(h);
     do {{
         advance(x, z, segment, &time, &rest, p, prepared, following, &used);
         memcpy(x, following, NX * sizeof *x);
@@ -160,12 +169,13 @@ def c_program(
     routines += [
         c_routine(rate.setup, "rate_setup", inputs=["p"]),
         c_routine(record.setup, "record_setup", inputs=["p"]),
-        c_routine(lower_trigonometry(record.body), "output" if reduction is None else "fold"),
+        c_routine(finished(record.body), "output" if reduction is None else "fold"),
         _update(system),
     ]
     return _TEMPLATE.format(
         support=support(lanes),
         states=system.state.size,
+        stages=method.stages if isinstance(method, ButcherTableau) else 1,
         held=system.held.size,
         inputs=system.inputs.size,
         outputs=size,
@@ -184,8 +194,8 @@ def _step(
 ) -> tuple[str, list[str]]:
     if isinstance(method, ButcherTableau):
         code = "\n".join(_stage_lines(method))
-        step = _RUNGE_KUTTA.format(name=method.name, stages=method.stages, code=code)
-        return step, [c_routine(lower_trigonometry(rate.body), "rate")]
+        step = _RUNGE_KUTTA.format(name=method.name, code=code)
+        return step, [c_routine(finished(rate.body), "rate")]
     advance = step_program(system, rate, method, powers)
     return _SERIES.format(name=method.name), [c_routine(advance, "advance")]
 
@@ -203,14 +213,14 @@ def _stage_lines(method: ButcherTableau) -> list[str]:
     for stage in range(method.stages):
         if stage:
             lines.append(
-                f"    for (int i = 0; i < NX; ++i) y[i] = {_combination(method.a[stage])};"
+                f"    for (int i = 0; i < WIDTH; ++i) y[i] = {_combination(method.a[stage])};"
             )
         # A stage at the same instant as the one before sees the same input.
         if stage == 0 or method.c[stage] != method.c[stage - 1]:
             time = f"s + {float(method.c[stage])!r} * h"
             lines.append(f"    inputs_at(segment, splat({time}), v);")
         lines.append(f"    rate({'y' if stage else 'x'}, z, v, p, prepared, k[{stage}]);")
-    lines.append(f"    for (int i = 0; i < NX; ++i) x[i] = {_combination(method.b)};")
+    lines.append(f"    for (int i = 0; i < WIDTH; ++i) x[i] = {_combination(method.b)};")
     return lines
 
 

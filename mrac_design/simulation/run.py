@@ -18,8 +18,8 @@ from mrac_design.simulation.system import HybridSystem
 Progress = Callable[[float], None]
 """Called with the finished fraction of a run, 0 to 1; may raise to cancel it."""
 
-_CHUNKS = 50
-"""Parts a run is cut into: how often progress is shown and an interruption is noticed."""
+_PART = 20_000
+"""Integration steps between two looks at progress and interruptions: about 20 ms."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -75,7 +75,8 @@ def run(
         held[:] = initial_held
     time = schedule.start[schedule.records]
     rows: list[FloatArray] = []
-    edges = np.linspace(0, schedule.length.size, _CHUNKS + 1).astype(int)
+    parts = max(1, int(schedule.substeps.sum()) // _PART)
+    edges = np.linspace(0, schedule.length.size, parts + 1).astype(int)
     for first, last in pairwise(edges):
         rows.append(engine.run(schedule, slice(first, last), coefficients, parameters, state, held))
         _require_finite(rows, time, state)

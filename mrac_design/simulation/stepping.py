@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import casadi as ca
 
 from mrac_design.arrays import FloatArray
-from mrac_design.codegen.passes import hoist_settled, share_reciprocals
+from mrac_design.codegen.passes import fuse_products, hoist_settled, share_reciprocals
 from mrac_design.codegen.reading import call_program, operations_as_written, read_function
 from mrac_design.codegen.straight_line import Builder, OperationCount, StraightLine
 from mrac_design.codegen.taylor import SeriesEvaluator
@@ -46,6 +46,11 @@ def prepare(function: ca.Function, *, names: Sequence[str] = ARGUMENTS) -> Prepa
     return Prepared(setup=setup, body=body, written=operations_as_written(function))
 
 
+def finished(program: StraightLine) -> StraightLine:
+    """A program as the machines run it: sines written out, products fused with sums."""
+    return fuse_products(lower_trigonometry(program))
+
+
 def step_program(
     system: HybridSystem, rate: Prepared, method: ButcherTableau | TaylorSeries, powers: int
 ) -> StraightLine:
@@ -63,7 +68,7 @@ def step_program(
     prepared = builder.input("prepared", len(rate.setup.output("prepared")))
     channels = [segment[i : i + powers] for i in range(0, len(segment), powers)]
     if isinstance(method, ButcherTableau):
-        body = lower_trigonometry(rate.body)
+        body = finished(rate.body)
         following = _runge_kutta(builder, body, method, x, channels, (z, p, prepared), s, h)
         return builder.finish({"following": following, "used": [h]})
     terms = _taylor_terms(builder, rate.body, method.order, x, channels, (z, p, prepared), s, h)
@@ -77,7 +82,7 @@ def step_program(
             value = builder.add(builder.multiply(value, share), term)
         following.append(value)
     used = builder.multiply(h, share)
-    return lower_trigonometry(builder.finish({"following": following, "used": [used]}))
+    return finished(builder.finish({"following": following, "used": [used]}))
 
 
 def _runge_kutta(

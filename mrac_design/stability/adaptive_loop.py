@@ -22,6 +22,7 @@ import numpy as np
 from flint import fmpq
 from numpy.typing import NDArray
 
+from mrac_design.arrays import FloatArray, readonly
 from mrac_design.errors import ParameterError
 from mrac_design.polynomials.rationals import Number, binary_rational, decimal_rational
 from mrac_design.stability.rational_function import to_float
@@ -152,6 +153,16 @@ def relative_box(
     )
 
 
+def projection_bounds(loop: AdaptiveLoop, box: ParameterBox) -> tuple[FloatArray, FloatArray]:
+    """Least and greatest (r1', s0, s1) in SI units, (3,) each, for a projection to the box.
+
+    Rounded inward, so that every float between them is inside the proved box.
+    """
+    lower = [_rounded(v * d, 1) for v, d in zip(box.lower, loop.gain_scale, strict=True)]
+    upper = [_rounded(v * d, -1) for v, d in zip(box.upper, loop.gain_scale, strict=True)]
+    return readonly(lower), readonly(upper)
+
+
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class Vertex:
     """The loop's matrices at one corner of the polytope, over the rationals."""
@@ -232,6 +243,13 @@ def _three(gains: Sequence[Number]) -> Sequence[Number]:
     if len(gains) != 3:
         raise ParameterError("gains", len(gains), "needs the three feedback gains r1', s0, s1")
     return gains
+
+
+def _rounded(value: fmpq, direction: int) -> float:
+    """The float next to a rational on its side of +∞ (1) or −∞ (−1), or the rational itself."""
+    nearest = to_float(value)
+    error = binary_rational(nearest) - value
+    return float(np.nextafter(nearest, direction * np.inf)) if error * direction < 0 else nearest
 
 
 def _distinct(pair: tuple[fmpq, fmpq]) -> tuple[fmpq, ...]:

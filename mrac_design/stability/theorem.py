@@ -12,6 +12,7 @@ from dataclasses import dataclass
 from flint import fmpq_poly
 
 from mrac_design.polynomials.stable import half_plane_distribution
+from mrac_design.stability.certificate import StabilityCertificate
 from mrac_design.stability.factorisation import Factorisation
 from mrac_design.stability.hypotheses import (
     Hypothesis,
@@ -22,6 +23,7 @@ from mrac_design.stability.hypotheses import (
 )
 from mrac_design.stability.positive_real import PositiveRealness
 from mrac_design.stability.rational_function import to_float
+from mrac_design.stability.sampled_loop import Sampling
 from mrac_design.verdict import Verdict
 
 
@@ -139,6 +141,66 @@ def augmented_error_argument(
         ),
         hypotheses=hypotheses,
     )
+
+
+def certified_loop(certificate: StabilityCertificate) -> TheoremCoverage:
+    """What the common Lyapunov function of a certificate asks for, and what it gives."""
+    sampled = isinstance(certificate.timing, Sampling)
+    timing = (
+        f"sampled at {to_float(1 / certificate.timing.period):.6g} Hz, delay of "
+        f"{certificate.timing.delay} periods, as the processor runs it"
+        if isinstance(certificate.timing, Sampling)
+        else "the law runs in continuous time"
+    )
+    low, high = (
+        to_float(ratio * certificate.loop.design_stiffness)
+        for ratio in certificate.box.stiffness_ratio
+    )
+    failure = certificate.verify()
+    proved = certificate.verdict is Verdict.PROVED and failure is None
+    hypotheses = (
+        decided("common Lyapunov function over the box", proved, failure or certificate.reason),
+        Hypothesis(
+            name="gains stay in the box",
+            status=Status.ASSUMED,
+            evidence="holds by construction when the law projects to the box",
+        ),
+        Hypothesis(
+            name="stiffness in its range",
+            status=Status.ASSUMED,
+            evidence=f"{low:.6g} to {high:.6g} N/m, as stated by the engineer",
+        ),
+        Hypothesis(
+            name="sampling",
+            status=Status.PROVED if sampled else Status.ASSUMED,
+            evidence=timing,
+        ),
+        Hypothesis(
+            name="each axis linearised to Ẍ = u − K2 Ẋ",
+            status=Status.ASSUMED,
+            evidence=_linearisation(certificate),
+        ),
+        Hypothesis(
+            name="the command is applied without saturation",
+            status=Status.ASSUMED,
+            evidence="compare the simulated torques with their limits",
+        ),
+    )
+    return TheoremCoverage(
+        theorem="The common Lyapunov function",
+        conclusion=(
+            "exponential stability for every path of the gains, and bounded force for a bounded "
+            "heart motion"
+        ),
+        hypotheses=hypotheses,
+    )
+
+
+def _linearisation(certificate: StabilityCertificate) -> str:
+    if certificate.mismatch is None:
+        return "exact linearisation by the robot's model"
+    percent = 100 * certificate.tolerated_mismatch
+    return f"an inertia mismatch up to {percent:.3g} % between the axes keeps stability"
 
 
 def _minimum_phase(numerator: fmpq_poly) -> Hypothesis:

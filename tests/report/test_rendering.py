@@ -176,6 +176,16 @@ def test_formula_that_cannot_be_set_is_an_error(tmp_path, scenario):
     assert leftovers(tmp_path) == set()
 
 
+def test_page_is_not_published_without_its_pdf(tmp_path, scenario, monkeypatch):
+    def refuse(*_, **__):
+        raise RuntimeError("no such font")
+
+    monkeypatch.setattr("typst.compile", refuse)
+    with pytest.raises(RenderingError, match="PDF could not be made: no such font"):
+        render(tmp_path, scenario, [write(tmp_path, "# %% [markdown]\n# # One\n")])
+    assert leftovers(tmp_path) == set()
+
+
 def test_older_report_survives_a_failure(tmp_path, scenario):
     out = render(tmp_path, scenario, [write(tmp_path, "# %% [markdown]\n# # One\n")])
     before = {path.name: path.read_bytes() for path in out.iterdir()}

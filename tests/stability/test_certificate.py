@@ -9,7 +9,13 @@ import pytest
 from flint import fmpq
 
 from mrac_design.errors import ParameterError
-from mrac_design.stability.adaptive_loop import AdaptiveLoop, adaptive_loop, relative_box
+from mrac_design.stability import Status, certified_loop
+from mrac_design.stability.adaptive_loop import (
+    AdaptiveLoop,
+    adaptive_loop,
+    projection_bounds,
+    relative_box,
+)
 from mrac_design.stability.certificate import StabilityCertificate, vertices_of
 from mrac_design.stability.certification import certify, largest_box
 from mrac_design.stability.claims import first_failure
@@ -237,6 +243,48 @@ def test_exponentials_are_enclosed(x) -> None:
     value = np.exp(-int(x.p) / int(x.q))
     assert high - low < fmpq(1, 2**90)
     assert int(low.p) / int(low.q) == pytest.approx(value, rel=1e-12)
+
+
+def test_projection_bounds_lie_inside_the_box(continuous) -> None:
+    lower, upper = projection_bounds(continuous.loop, continuous.box)
+    scale = continuous.loop.gain_scale
+    for k in range(3):
+        low, high = (fmpq(*float(side[k]).as_integer_ratio()) for side in (lower, upper))
+        assert (
+            continuous.box.lower[k] <= low / scale[k] <= high / scale[k] <= continuous.box.upper[k]
+        )
+    nominal = [int(g.p) / int(g.q) for g in continuous.loop.gains]
+    np.testing.assert_allclose(lower, np.multiply(nominal, 0.6), rtol=1e-14)
+
+
+def test_the_report_lists_what_the_certificate_still_assumes(sampled) -> None:
+    coverage = certified_loop(sampled)
+    status = {item.name: item.status for item in coverage.hypotheses}
+    assert status["common Lyapunov function over the box"] is Status.PROVED
+    assert status["sampling"] is Status.PROVED
+    assert status["gains stay in the box"] is Status.ASSUMED
+    assert coverage.verdict is Verdict.UNDECIDED
+    assert "1000 Hz" in coverage._repr_markdown_()
+
+
+def test_mismatched_inertia_below_the_bound_is_stable(continuous) -> None:
+    """Three axes coupled by M⁻¹M̂ = 1 + Δ with random Δ at the tolerated norm, random corners."""
+    rng = np.random.default_rng(8)
+    bound = continuous.tolerated_mismatch
+    assert 0.02 < bound < 1
+    vertices = vertices_of(continuous.loop, continuous.box, continuous.timing)
+    for _ in range(60):
+        delta = rng.standard_normal((3, 3))
+        delta *= bound / np.linalg.norm(delta, 2)
+        picks = [vertices[k] for k in rng.integers(len(vertices), size=3)]
+        A = np.zeros((12, 12))
+        for i, vertex in enumerate(picks):
+            A[4 * i : 4 * i + 4, 4 * i : 4 * i + 4] = to_floats(vertex.A)
+            for k, other in enumerate(picks):
+                A[4 * i + 1, 4 * k : 4 * k + 4] += (
+                    delta[i, k] * to_floats(other.linearised_command)[0]
+                )
+        assert np.linalg.eigvals(A).real.max() < 0
 
 
 def test_bad_numbers_are_refused() -> None:

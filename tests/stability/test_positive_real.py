@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
+import dataclasses
 from collections import Counter
 
 import control
 import numpy as np
 import pytest
-from flint import fmpq_poly
+from flint import fmpq, fmpq_poly
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
@@ -61,6 +62,32 @@ def test_discrete_functions_agree_with_enclosed_roots() -> None:
         assert ours == discrete_verdicts(numerator, denominator), (numerator, denominator)
         seen.update(ours.items())
     assert min(seen[kind, answer] for kind in QUESTIONS for answer in (True, False)) >= 20, seen
+
+
+@pytest.mark.parametrize("kind", list(QUESTIONS))
+def test_every_proved_verdict_carries_a_witness_that_multiplies_out(kind) -> None:
+    systems = [(*pair, None) for pair in continuous_pairs(seed=5, count=250)]
+    systems += [(*pair, Discrete(1e-3)) for pair in discrete_pairs(seed=6, count=100)]
+    judged = [QUESTIONS[kind](*system) for system in systems]
+    for result in judged:
+        assert (result.witness is not None) == (result.verdict is Verdict.PROVED)
+        assert result.witness is None or result.witness.verify(), result.function
+    assert sum(result.witness is not None for result in judged) >= 50
+
+
+def test_a_spoilt_witness_is_noticed() -> None:
+    storage = strictly_positive_real([1, 3], [1, 4, 5]).witness
+    P = storage.P * fmpq(11, 10)
+    assert not dataclasses.replace(storage, P=P).verify()
+    sampled = strictly_positive_real([1, "0.2"], [1, "-0.3"], Discrete(1.0)).witness
+    assert not dataclasses.replace(sampled, P=sampled.P * 9).verify()
+    factors = positive_real([1, 0, 1], [1, 2, 1]).witness
+    assert factors.verify()
+    assert not dataclasses.replace(factors, power=factors.power + 1).verify()
+    negative = dataclasses.replace(
+        factors, positive=-factors.positive, real_part=-factors.real_part
+    )
+    assert not negative.verify()
 
 
 positive = st.fractions(min_value="1/1000", max_value=1000, max_denominator=1000)

@@ -45,6 +45,8 @@ class ObserverTuning:
     """τ of the critically damped loop (s)."""
     drive: float
     """Standard deviation of that N-th difference, in the input's unit."""
+    input_noise: float
+    """Standard deviation of white noise at the input, in its unit; 0 trusts the model fully."""
     force_noise: float
     """Standard deviation of the force sensor's noise (N); only its ratio to `drive` matters."""
 
@@ -53,6 +55,8 @@ class ObserverTuning:
             value = getattr(self, name)
             if not 0 < value < float("inf"):
                 raise ParameterError(name.replace("_", " "), value, "must be finite and > 0")
+        if not 0 <= self.input_noise < float("inf"):
+            raise ParameterError("input noise", self.input_noise, "must be finite and >= 0")
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -85,8 +89,9 @@ def state_feedback(model: SampledModel, domain: Discrete, time_constant: float) 
 def observed_disturbance_gain(model: SampledModel, tuning: ObserverTuning) -> FloatArray:
     """Kalman gain of the model with the tuning's disturbance at its input, (n + N,)."""
     augmented = model.with_disturbance(*difference_chain(tuning.order))
-    drive = np.zeros((augmented.order, 1))
-    drive[-1] = tuning.drive
+    drive = np.column_stack(
+        [tuning.input_noise * augmented.input, tuning.drive * np.eye(augmented.order)[-1]]
+    )
     return kalman_gain(augmented, drive, tuning.force_noise)
 
 

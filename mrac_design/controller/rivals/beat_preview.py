@@ -111,6 +111,7 @@ def beat_preview_step(specification: BeatPreview) -> ControllerStep:
             *pending_block("pending", specification.delay),
             ("cells", specification.cells),
             ("age", 1),
+            ("interval", 1),
             PREFILTER,
         )
     )
@@ -127,7 +128,7 @@ def beat_preview_step(specification: BeatPreview) -> ControllerStep:
     waiting = ca.vertsplit(state["pending"]) if specification.delay else []
     # The age kept from the last sample serves the command; a new beat shows one sample later.
     ages = [state["age"] + j * symbols["period"] for j in range(_reach(specification))]
-    memory = [_remembered(symbols, state["cells"], instant) for instant in ages]
+    memory = [_remembered(symbols, state, instant) for instant in ages]
     met = filtered
     for command_on_its_way, known in zip(reversed(waiting), memory, strict=False):
         met = _advanced(symbols, met, command_on_its_way + known)
@@ -138,11 +139,15 @@ def beat_preview_step(specification: BeatPreview) -> ControllerStep:
         - ca.dot(symbols["preview"], coming)
         - met[2]
     )
-    now = _remembered(symbols, state["cells"], age)
+    now = _remembered(symbols, state, age)
     following = {
         "estimate": _advanced(symbols, filtered, (waiting[-1] if waiting else applied) + now),
-        "cells": state["cells"] + _taught(symbols, specification.cells, age) * filtered[2],
+        "cells": _taught(symbols, state, age - symbols["lag"], filtered[2]),
         "age": age + symbols["period"],
+        # An age below the expected one is a new beat: the last one was that long.
+        "interval": ca.if_else(
+            age < state["age"] - symbols["period"] / 2, state["age"], state["interval"]
+        ),
         "prefilter": _rows(symbols["prefilter"], columns),
     }
     if waiting:
@@ -230,13 +235,21 @@ def _hats(position: ca.SX, count: int) -> ca.SX:
     return ca.fmax(0, 1 - ca.fabs(position - ca.DM(range(count))))
 
 
-def _remembered(symbols: Mapping[str, ca.SX], cells: ca.SX, age: ca.SX) -> ca.SX:
-    """Remembered disturbance at an age of the beat (m/s²); past the last cell, that cell's."""
-    position = ca.fmin(age / symbols["cell_width"], cells.numel() - 1)
+def _remembered(symbols: Mapping[str, ca.SX], state: Mapping[str, ca.SX], age: ca.SX) -> ca.SX:
+    """Remembered disturbance at an age of the beat (m/s²).
+
+    Past the length of the last beat it stays at the value there, where the next beat joins on.
+    """
+    cells = state["cells"]
+    known = ca.fmin(state["interval"] / symbols["cell_width"], cells.numel() - 1)
+    position = ca.fmin(age / symbols["cell_width"], known)
     return ca.dot(_hats(position, cells.numel()), cells)
 
 
-def _taught(symbols: Mapping[str, ca.SX], count: int, age: ca.SX) -> ca.SX:
-    """Share of the present observation that each cell takes over."""
-    position = (age - symbols["lag"]) / symbols["cell_width"]
-    return symbols["learning"] * _hats(position, count)
+def _taught(
+    symbols: Mapping[str, ca.SX], state: Mapping[str, ca.SX], age: ca.SX, residual: ca.SX
+) -> ca.SX:
+    """The cells after one more sample: those near `age` move towards what was found there."""
+    found = _remembered(symbols, state, age) + residual
+    share = symbols["learning"] * _hats(age / symbols["cell_width"], state["cells"].numel())
+    return state["cells"] + share * (found - state["cells"])
