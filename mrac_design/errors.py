@@ -159,6 +159,10 @@ class SimulationError(MracDesignError):
     """A simulation left the range of finite numbers."""
 
 
+class EnsembleError(MracDesignError):
+    """An ensemble cannot start, go on from its store, or reach its cluster."""
+
+
 class CertificateError(MracDesignError):
     """A stability certificate does not exist, or does not hold what it claims."""
 

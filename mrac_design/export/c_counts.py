@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 import re
 import shutil
 import subprocess
@@ -90,8 +91,9 @@ def _run(command: list[str], folder: Path) -> str | None:
     """Everything the command printed, None when it failed."""
     try:
         result = subprocess.run(
-            command, capture_output=True, text=True, check=False, cwd=folder, timeout=_TIMEOUT
-        )
+            command, capture_output=True, text=True, check=False, cwd=folder, timeout=_TIMEOUT,
+            env={**os.environ, "LD_BIND_NOW": "1"},  # the dynamic linker's work is not the step's
+        )  # fmt: skip
     except (OSError, subprocess.TimeoutExpired):
         return None
     return result.stdout + result.stderr if result.returncode == 0 else None

@@ -6,6 +6,7 @@ the files gives the same `GainSet`, bit for bit.
 
 from __future__ import annotations
 
+import hashlib
 import json
 import tomllib
 from collections.abc import Callable, Mapping
@@ -23,6 +24,8 @@ from mrac_design.export.gain_set import GainSet
 from mrac_design.export.writing import written_whole
 
 _MATLAB_NAME = "mrac_gains"
+_MATLAB_HEADER = b"mrac_design gains; SHA-256 of what follows: "
+_MATLAB_HEADER_SIZE = 116
 
 
 @dataclass(frozen=True, slots=True)
@@ -129,7 +132,8 @@ def _yaml_lines(table: Mapping[str, Any], indent: int) -> list[str]:
 
 def _yaml_value(value: str | float | list[float]) -> str:
     if isinstance(value, str):
-        return json.dumps(value, ensure_ascii=not value.isprintable())
+        plain = (c if c.isprintable() and c not in '"\\' else f"\\U{ord(c):08x}" for c in value)
+        return f'"{"".join(plain)}"'
     if isinstance(value, list):
         return f"[{', '.join(map(_yaml_value, value))}]"
     # YAML 1.1 takes 1e-05 for a text, and ROS takes 500 for an integer.
@@ -170,21 +174,26 @@ def _to_matlab(document: Mapping[str, Any]) -> bytes:
 
     stream = BytesIO()
     savemat(stream, {_MATLAB_NAME: document}, long_field_names=True, oned_as="row")
-    return stream.getvalue()
+    # The header is free text, by default the time of writing.
+    return _matlab_header(content := stream.getvalue()[_MATLAB_HEADER_SIZE:]) + content
+
+
+def _matlab_header(content: bytes) -> bytes:
+    digest = hashlib.sha256(content).hexdigest().encode()
+    return (_MATLAB_HEADER + digest)[:_MATLAB_HEADER_SIZE].ljust(_MATLAB_HEADER_SIZE)
 
 
 def _from_matlab(content: bytes) -> Any:
     from scipy.io import loadmat
 
-    try:
-        variables = loadmat(BytesIO(content), simplify_cells=True)
-    # A damaged file makes the reader fail in whatever way its bytes suggest.
-    except Exception as problem:
-        raise _MalformedError(f"is not a MATLAB 5 file: {problem}") from problem
-    names = [name for name in variables if not name.startswith("__")]
-    if names != [_MATLAB_NAME]:
-        raise _MalformedError(f"needs the variable {_MATLAB_NAME} and no other, holds {names}")
-    return _from_cells(variables[_MATLAB_NAME])
+    # SciPy's reader can crash the interpreter on a damaged file, so none gets that far.
+    header, rest = content[:_MATLAB_HEADER_SIZE], content[_MATLAB_HEADER_SIZE:]
+    if header != _matlab_header(rest):
+        raise _MalformedError(
+            "is not a MATLAB file as mrac_design wrote it (the SHA-256 in its header does not "
+            "fit); export the gains again"
+        )
+    return _from_cells(loadmat(BytesIO(content), simplify_cells=True)[_MATLAB_NAME])
 
 
 def _from_cells(value: Any, key: str = "") -> Any:

@@ -140,14 +140,7 @@ def robot_step_of(gains: GainSet, robot: str, time_domain: Discrete) -> RobotSte
     `robot` is a packaged robot or a robot file. Raises ModelFileError when it is not the file
     the gains were made for.
     """
-    found = robot_fingerprint(robot)
-    if found.sha256 != gains.robot.sha256:
-        raise ModelFileError(
-            robot,
-            "",
-            f"is not the robot the gains were made for: SHA-256 {found.sha256[:12]}… instead of "
-            f"{gains.robot.sha256[:12]}… ({gains.robot.file}); give that file, or design anew",
-        )
+    require_robot(gains, robot)
     dynamics = build_dynamics(load_robot(robot))
     linearisation = build_linearisation(
         dynamics,
@@ -158,6 +151,18 @@ def robot_step_of(gains: GainSet, robot: str, time_domain: Discrete) -> RobotSte
     step = build_step(controller_of(gains, time_domain))
     axes = len(dynamics.description.force_axes)
     return build_robot_step(dynamics, linearisation, [step] * axes, time_domain=time_domain)
+
+
+def require_robot(gains: GainSet, robot: str) -> None:
+    """Raise ModelFileError when `robot` is not the robot file the gains were made for."""
+    found = robot_fingerprint(robot)
+    if found.sha256 != gains.robot.sha256:
+        raise ModelFileError(
+            robot,
+            "",
+            f"is not the robot the gains were made for: SHA-256 {found.sha256[:12]}… instead of "
+            f"{gains.robot.sha256[:12]}… ({gains.robot.file}); give that file, or design anew",
+        )
 
 
 def robot_fingerprint(robot: str) -> RobotFingerprint:

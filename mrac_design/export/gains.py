@@ -10,8 +10,14 @@ from typing import Any
 
 from mrac_design.design import RSTDesign
 from mrac_design.export.gain_document import document_hash, document_of, gains_schema_path
-from mrac_design.export.gain_formats import read_gains, write_gains
-from mrac_design.export.gain_set import GainSet, controller_of, gain_set, robot_step_of
+from mrac_design.export.gain_formats import read_gains, require_gains_suffix, write_gains
+from mrac_design.export.gain_set import (
+    GainSet,
+    controller_of,
+    gain_set,
+    require_robot,
+    robot_step_of,
+)
 from mrac_design.simulation.scenario import Scenario
 from mrac_design.study import VARIANTS, Variant
 
@@ -24,6 +30,8 @@ __all__ = [
     "gains_document",
     "gains_schema_path",
     "read_gains",
+    "require_gains_suffix",
+    "require_robot",
     "robot_step_of",
     "write_gains",
 ]

@@ -12,6 +12,7 @@ from mrac_design.polynomials.diophantine import (
     solve_diophantine,
     solve_diophantine_exact,
 )
+from mrac_design.polynomials.expressions import Expression, Letter, solve_symbolic, symbols
 from mrac_design.polynomials.rationals import (
     binary_rational,
     coefficients,
@@ -25,6 +26,8 @@ __all__ = [
     "DiophantineEquation",
     "DiophantineSolution",
     "ExactDiophantineSolution",
+    "Expression",
+    "Letter",
     "SylvesterSystem",
     "binary_rational",
     "coefficients",
@@ -34,4 +37,6 @@ __all__ = [
     "roots",
     "solve_diophantine",
     "solve_diophantine_exact",
+    "solve_symbolic",
+    "symbols",
 ]

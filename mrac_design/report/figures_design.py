@@ -12,7 +12,7 @@ from matplotlib.axes import Axes
 from numpy.typing import NDArray
 
 from mrac_design.arrays import FloatArray
-from mrac_design.design import RSTDesign
+from mrac_design.design import FeedbackLoop, RSTDesign
 from mrac_design.plant import ForcePlant
 from mrac_design.polynomials.rationals import roots
 from mrac_design.report.style import (
@@ -51,7 +51,8 @@ def pole_figure(design: RSTDesign) -> CaptionedFigure:
 def draw_poles(ax: Axes, design: RSTDesign) -> None:
     """The pole map of `pole_figure` on given axes."""
     factors = np.geomspace(*STIFFNESS_RANGE, 81)
-    paths = np.concatenate([_poles_at_stiffness(design, factor) for factor in factors])
+    assumed = design.specification.plant.stiffness
+    paths = np.concatenate([loop_on(design, factor * assumed).poles for factor in factors])
     paths = np.concatenate([paths, paths.conj()])
     ax.plot(paths.real, paths.imag, ".", color="#b9d6e8", markersize=3, label="wrong stiffness")
     groups = (
@@ -69,6 +70,13 @@ def draw_poles(ax: Axes, design: RSTDesign) -> None:
     ax.set_xlabel("Re $p$ (rad/s)")
     ax.set_ylabel("Im $p$ (rad/s)")
     ax.margins(0.08, 0.15)
+
+
+def loop_on(design: RSTDesign, stiffness: float) -> FeedbackLoop:
+    """The design's controller, frozen, on tissue of a true `stiffness` (N/m)."""
+    velocity_gain = design.specification.plant.velocity_gain
+    true = ForcePlant(stiffness=stiffness, velocity_gain=velocity_gain)
+    return replace(design.loop, process=true.process)
 
 
 @styled()
@@ -112,7 +120,7 @@ def sensitivity_figure(design: RSTDesign) -> CaptionedFigure:
         "desired force (the reference model itself) and from sensor noise to the force.",
     )
     heart, force = figure.subplots(1, 2)
-    draw_heart_sensitivity(heart, design)
+    draw_heart_sensitivity(heart, design.loop, design.specification.plant.stiffness)
     omega = _frequencies(design)
     force.loglog(
         omega,
@@ -133,11 +141,13 @@ def sensitivity_figure(design: RSTDesign) -> CaptionedFigure:
     return figure
 
 
-def draw_heart_sensitivity(ax: Axes, design: RSTDesign) -> None:
-    """Force error over heart motion (N/mm) against frequency (Hz), gains frozen."""
+def draw_heart_sensitivity(ax: Axes, loop: FeedbackLoop, stiffness: float) -> None:
+    """Force error over heart motion (N/mm) against frequency (Hz), gains frozen.
+
+    `stiffness` is the Ks (N/m) in the process of `loop`.
+    """
     hertz = np.geomspace(0.1, 300, 400)
-    stiffness = design.specification.plant.stiffness
-    gain = 1e-3 * stiffness * np.abs(design.disturbance_sensitivity()(2j * np.pi * hertz))
+    gain = 1e-3 * stiffness * np.abs(loop.disturbance_sensitivity()(2j * np.pi * hertz))
     ax.loglog(hertz, gain, color=COLOURS["heart"], label="heart motion to force")
     ax.axvspan(*_BEAT, color=COLOURS["heart"], alpha=0.15, linewidth=0)
     ax.set_xlabel("frequency (Hz)")
@@ -177,12 +187,6 @@ def realness_figure(factorisations: Sequence[Factorisation], bandwidth: float) -
     weighted.set_ylabel("$\\omega^2$ Re $G_1$, scaled (–)")
     legend_above(figure, phase.get_legend_handles_labels()[0], columns=3)
     return figure
-
-
-def _poles_at_stiffness(design: RSTDesign, factor: float) -> NDArray[np.complex128]:
-    plant = design.specification.plant
-    true = ForcePlant(stiffness=factor * plant.stiffness, velocity_gain=plant.velocity_gain)
-    return replace(design.loop, process=true.process).poles
 
 
 def _note_multiplicity(ax: Axes, poles: NDArray[np.complex128]) -> None:

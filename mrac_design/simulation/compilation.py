@@ -2,11 +2,14 @@
 
 from __future__ import annotations
 
+import atexit
 import ctypes
+import errno
 import hashlib
 import logging
 import os
 import platform
+import shlex
 import shutil
 import subprocess
 import tempfile
@@ -16,69 +19,103 @@ from pathlib import Path
 from mrac_design.errors import CompilationError
 
 _LOG = logging.getLogger(__name__)
-# No contraction and no reassociation: the same bits as CasADi's own machine on every rerun.
+# No contraction and no reassociation beyond what the source asks for: the same bits on every rerun
+# and in every lane.
 _FLAGS = (
-    "-std=c99", "-O3", "-march=native", "-ffp-contract=off",
-    "-fno-math-errno", "-fno-trapping-math", "-mprefer-vector-width=512", "-fPIC", "-shared",
+    "-std=gnu99", "-O3", "-march=native", "-ffp-contract=off",
+    "-fno-math-errno", "-fno-trapping-math", "-fPIC", "-shared",
 )  # fmt: skip
+_X86_FLAGS = ("-mprefer-vector-width=512",)
+_TIME_LIMIT = 600.0
+"""Seconds after which a compiler is given up."""
 
 
 def find_compiler() -> str | None:
-    """Path of the C compiler: $CC if set, else the first of cc, gcc, clang on the PATH."""
-    candidates = [os.environ["CC"]] if os.environ.get("CC") else ["cc", "gcc", "clang"]
-    return next((path for name in candidates if (path := shutil.which(name))), None)
+    """The C compiler: $CC if set (it may hold options), else the first of cc, gcc, clang."""
+    chosen = os.environ.get("CC", "").strip()
+    if chosen:
+        name, *options = shlex.split(chosen)
+        path = shutil.which(name)
+        if path is None:
+            _LOG.warning("the compiler named by CC, '%s', is not there", chosen)
+            return None
+        return shlex.join([path, *options])
+    return next((path for name in ("cc", "gcc", "clang") if (path := shutil.which(name))), None)
 
 
 def compile_library(source: str, compiler: str) -> ctypes.CDLL:
     """Load the shared library of `source`, from the cache when it was compiled before.
 
-    Raises CompilationError with the compiler's first message when it refuses the source.
+    Any number of processes may do so at once. Where the user's cache cannot be written or the
+    disk is full, a private folder serves. Raises CompilationError with the compiler's first error
+    when it refuses the source, and when there is no folder to write to.
     """
-    flags = (*_FLAGS, "-lm")
+    command = shlex.split(compiler)
+    flags = (*_FLAGS, *(_X86_FLAGS if platform.machine() in ("x86_64", "AMD64") else ()))
     key = "\n".join((source, " ".join(flags), compiler, _version(compiler), _processor()))
     name = f"{hashlib.sha256(key.encode()).hexdigest()[:32]}.so"
-    for directory in _cache_directories():
-        library = directory / name
+    obstacles = []
+    for find_directory in (_user_cache, _private_directory):
         try:
-            if not library.exists():
-                _compile(source, compiler, flags, library)
+            library = find_directory() / name
+            if library.exists():
+                try:
+                    return ctypes.CDLL(str(library))
+                except OSError:
+                    _LOG.info("%s is damaged: compiled anew", library)
+            _compile(source, command, flags, library)
             return ctypes.CDLL(str(library))
-        except OSError as problem:
-            _LOG.info("cannot keep compiled code in %s (%s)", directory, problem)
-    raise CompilationError([compiler], "no folder to keep the compiled library in")
+        except (OSError, RuntimeError) as problem:
+            _LOG.info("cannot keep compiled code (%s)", problem)
+            obstacles.append(str(problem))
+    raise CompilationError(command, f"nowhere to keep the compiled code: {'; '.join(obstacles)}")
 
 
-def _compile(source: str, compiler: str, flags: tuple[str, ...], library: Path) -> None:
+def _compile(source: str, command: list[str], flags: tuple[str, ...], library: Path) -> None:
     library.parent.mkdir(parents=True, exist_ok=True)
-    with tempfile.TemporaryDirectory(dir=library.parent) as scratch:
+    with tempfile.TemporaryDirectory(dir=library.parent, ignore_cleanup_errors=True) as scratch:
         c_file, built = Path(scratch) / "program.c", Path(scratch) / "program.so"
-        c_file.write_text(source)
-        command = [compiler, str(c_file), "-o", str(built), *flags]
-        result = subprocess.run(command, capture_output=True, text=True, check=False)
-        if result.returncode != 0:
-            raise CompilationError(command, result.stderr)
+        c_file.write_text(source, encoding="utf-8")
+        full = [*command, *flags, str(c_file), "-o", str(built), "-lm"]
+        # Its own intermediate files lie beside the source, not in a temporary folder that may be
+        # smaller or not ours.
+        environment = {**os.environ, "TMPDIR": scratch, "LC_ALL": "C"}
+        try:
+            result = subprocess.run(
+                full,
+                capture_output=True, text=True, check=False, timeout=_TIME_LIMIT, env=environment,
+            )  # fmt: skip
+        except subprocess.TimeoutExpired as problem:
+            raise CompilationError(full, f"no answer in {_TIME_LIMIT:.0f} s") from problem
+        if os.strerror(errno.ENOSPC) in result.stderr:
+            raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC), str(library.parent))
+        if result.returncode != 0 or not built.exists():
+            raise CompilationError(full, result.stderr or "it wrote no library")
         # Renaming is atomic: another process sees the whole library or none.
         built.replace(library)
 
 
-def _cache_directories() -> tuple[Path, Path]:
-    """The user's cache, and a private temporary folder where that cannot be written."""
+def _user_cache() -> Path:
     home = os.environ.get("XDG_CACHE_HOME") or Path.home() / ".cache"
-    return Path(home) / "mrac_design", _private_directory()
+    return Path(home) / "mrac_design"
 
 
 @cache
 def _private_directory() -> Path:
-    return Path(tempfile.mkdtemp(prefix="mrac_design-"))
+    """A folder of this process alone, removed when it ends."""
+    folder = Path(tempfile.mkdtemp(prefix="mrac_design-"))
+    atexit.register(shutil.rmtree, folder, ignore_errors=True)
+    return folder
 
 
 @cache
 def _version(compiler: str) -> str:
     try:
         result = subprocess.run(
-            [compiler, "--version"], capture_output=True, text=True, check=False
-        )
-    except OSError as problem:
+            [*shlex.split(compiler), "--version"],
+            capture_output=True, text=True, check=False, timeout=60,
+        )  # fmt: skip
+    except (OSError, subprocess.TimeoutExpired) as problem:
         raise CompilationError([compiler, "--version"], str(problem)) from problem
     return result.stdout.partition("\n")[0]
 

@@ -1,4 +1,4 @@
-"""The two machines that run a hybrid system: compiled C, and CasADi's own interpreter."""
+"""The machines that run a hybrid system: compiled C, LLVM, and CasADi's own interpreter."""
 
 from __future__ import annotations
 
@@ -10,10 +10,12 @@ import casadi as ca
 import numpy as np
 
 from mrac_design.arrays import FloatArray
+from mrac_design.codegen.llvm_machine import LlvmModule, llvm_available
 from mrac_design.codegen.machine import casadi_function
 from mrac_design.errors import CompilationError
 from mrac_design.simulation.compilation import compile_library, find_compiler
 from mrac_design.simulation.emission import simplified
+from mrac_design.simulation.llvm_program import llvm_program
 from mrac_design.simulation.method import Method
 from mrac_design.simulation.program import c_program
 from mrac_design.simulation.schedule import Schedule
@@ -45,28 +47,34 @@ class Engine(Protocol):
 
 
 def build_engine(system: HybridSystem, method: Method, *, input_powers: int) -> Engine:
-    """Compiled C where a compiler works, else CasADi's interpreter, with a warning."""
+    """Compiled C where a compiler works, else LLVM, else CasADi's interpreter, with a warning."""
     compiler = find_compiler()
-    if compiler is None:
-        _LOG.warning("no C compiler found: CasADi's interpreter runs the simulation, slower")
-        return InterpretedEngine(system, method, input_powers=input_powers)
     try:
-        return CompiledEngine(system, method, input_powers=input_powers, compiler=compiler)
-    except CompilationError as problem:
-        _LOG.warning("%s; CasADi's interpreter runs the simulation, slower", problem)
-        return InterpretedEngine(system, method, input_powers=input_powers)
+        if compiler is not None:
+            return CompiledEngine(system, method, input_powers=input_powers, compiler=compiler)
+        problem = "no C compiler found"
+    except CompilationError as error:
+        problem = str(error)
+    if llvm_available():
+        _LOG.warning("%s: LLVM compiles the simulation instead", problem)
+        return LlvmEngine(system, method, input_powers=input_powers)
+    _LOG.warning(
+        "%s: CasADi's interpreter runs the simulation, hundreds of times slower; install a C "
+        "compiler or llvmlite",
+        problem,
+    )
+    return InterpretedEngine(system, method, input_powers=input_powers)
 
 
-class CompiledEngine:
-    """The C program of the system in a shared library; nothing of Python inside the loop."""
+class NativeEngine:
+    """A program in machine code; nothing of Python inside the loop."""
 
-    def __init__(
-        self, system: HybridSystem, method: Method, *, input_powers: int, compiler: str
-    ) -> None:
-        self.name = "compiled C"
-        self._outputs = system.outputs.size
-        library = compile_library(c_program(system, method, input_powers=input_powers), compiler)
-        self._run = run_entry(library.run)
+    name: str
+    """Shown to people."""
+
+    def __init__(self, entry: Any, outputs: int) -> None:
+        self._run = entry
+        self._outputs = outputs
 
     def run(
         self,
@@ -82,6 +90,29 @@ class CompiledEngine:
         rows = run_part(self._run, schedule, part, *arrays)
         assert rows == recorded.shape[0]
         return recorded
+
+
+class CompiledEngine(NativeEngine):
+    """The C program of the system in a shared library."""
+
+    name = "compiled C"
+
+    def __init__(
+        self, system: HybridSystem, method: Method, *, input_powers: int, compiler: str
+    ) -> None:
+        library = compile_library(c_program(system, method, input_powers=input_powers), compiler)
+        super().__init__(run_entry(library.run), system.outputs.size)
+
+
+class LlvmEngine(NativeEngine):
+    """The same program compiled inside the process by LLVM: no compiler needed."""
+
+    name = "LLVM"
+
+    def __init__(self, system: HybridSystem, method: Method, *, input_powers: int) -> None:
+        self._module = LlvmModule(llvm_program(system, method, input_powers=input_powers))
+        entry = ctypes.CFUNCTYPE(ctypes.c_long)(self._module.address("run"))
+        super().__init__(run_entry(entry), system.outputs.size)
 
 
 def run_entry(address: Any) -> Any:
@@ -110,7 +141,7 @@ def run_part(entry: Any, schedule: Schedule, part: slice, *arrays: FloatArray) -
 
 
 class InterpretedEngine:
-    """CasADi's own machine, for computers without a compiler: the same operations in order."""
+    """CasADi's own machine, the last resort: the same operations, but none fused."""
 
     def __init__(self, system: HybridSystem, method: Method, *, input_powers: int) -> None:
         self.name = "CasADi interpreter"

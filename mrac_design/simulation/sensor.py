@@ -93,7 +93,7 @@ class ForceSensor:
         symbols: Mapping[str, ca.SX],
     ) -> Mapping[str, ca.SX]:
         """The memory after a sampling instant; its `measured_force` (N) is what is measured."""
-        due = memory["sensor_wait"] <= 1
+        due = memory["sensor_wait"] <= 0
         fresh = self.quantiser.read(force + noise, symbols)
         return {
             "sensor_wait": ca.if_else(due, symbols["decimation"], memory["sensor_wait"]) - 1,

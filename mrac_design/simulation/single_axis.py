@@ -199,7 +199,7 @@ def white_noise(*, rms: float, period: float, duration: float, seed: int) -> Pie
     count = math.ceil(duration / period - 1e-9)
     samples = rms * np.random.default_rng(seed).standard_normal(count)
     return PiecewisePolynomial(
-        breakpoints=np.arange(count + 1) * period, coefficients=samples.reshape(1, -1, 1)
+        breakpoints=period * np.arange(count + 1.0), coefficients=samples.reshape(1, -1, 1)
     )
 
 

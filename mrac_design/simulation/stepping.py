@@ -196,6 +196,12 @@ def _allowed_share(builder: Builder, terms: list[list[int]], control: ErrorContr
     )
 
 
+def input_values(builder: Builder, segment: list[int], powers: int, time: int) -> list[int]:
+    """Values of the inputs at a time since the beginning of their segment."""
+    channels = (segment[i : i + powers] for i in range(0, len(segment), powers))
+    return [_horner(builder, channel, time) for channel in channels]
+
+
 def _horner(builder: Builder, coefficients: list[int], s: int) -> int:
     value = coefficients[-1]
     for coefficient in coefficients[-2::-1]:

@@ -101,7 +101,7 @@ def boundary_of(function: RationalFunction) -> Boundary:
         poles=half_plane_distribution(denominator),
         real_part=real_part,
         modulus=modulus,
-        sign=sign_on_interval(real_part, fmpq(1,100)),
+        sign=sign_on_interval(real_part, fmpq(0)),
     )
 
 

@@ -4,27 +4,34 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
-from functools import cache
 
 import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.lines import Line2D
 
+from mrac_design.controller.adaptive import build_step
 from mrac_design.design import RSTDesign
 from mrac_design.metrics.tracking import TrackingMetrics, tracking_metrics
-from mrac_design.motion import ForceReference
-from mrac_design.report.figures_design import draw_heart_sensitivity, draw_poles
-from mrac_design.report.style import CaptionedFigure, legend_above, line, new_figure, styled
-from mrac_design.robot import (
-    Body,
-    Joint,
-    JointType,
-    RobotDescription,
-    RobotDynamics,
-    TaskDefinition,
-    build_dynamics,
+from mrac_design.motion import AXES, StepSequence
+from mrac_design.report.figures_design import draw_heart_sensitivity, draw_poles, loop_on
+from mrac_design.report.style import (
+    COLOURS,
+    CaptionedFigure,
+    legend_above,
+    line,
+    new_figure,
+    styled,
 )
+from mrac_design.simulation.run import RunSettings
 from mrac_design.simulation.scenario import Scenario
+from mrac_design.simulation.single_axis import (
+    axis_inputs,
+    build_axis_engine,
+    build_axis_loop,
+    simulate_axis,
+)
 from mrac_design.simulation.trajectory import Trajectory
-from mrac_design.study import VARIANTS, scenario_design, scenario_motion, simulate_variants
+from mrac_design.study import VARIANTS, scenario_design, scenario_motion, variant_controller
 
 DURATION = 4.0
 """Simulated time of a panel (s): two force steps and a few heartbeats, redrawn in an instant."""
@@ -55,6 +62,8 @@ class DesignValues:
 class DesignView:
     """Design and single-axis response for one set of values."""
 
+    values: DesignValues
+    """The values shown."""
     design: RSTDesign
     """The RST design."""
     trajectories: Mapping[str, Trajectory]
@@ -96,21 +105,20 @@ def initial_values(scenario: Scenario) -> DesignValues:
 def design_view(values: DesignValues, scenario: Scenario) -> DesignView:
     """Design for `values` and simulate one axis; everything else is the scenario's.
 
-    The axis is a perfectly linearised mass sliding against the heart, run by the same simulation
-    and the same controllers as the whole robot. Raises ParameterError for values that cannot be,
-    SimulationError when the response grows without bound.
+    The axis is what exact linearisation leaves of the robot, under the same controllers as the
+    whole. Raises ParameterError for values that cannot be, SimulationError when the response
+    grows without bound.
     """
-    chosen = _single_axis(values, scenario)
+    chosen = _with_values(values, scenario)
     design = scenario_design(chosen)
-    trajectories = simulate_variants(
-        chosen, _sliding_mass(), design, scenario_motion(chosen), variants=VARIANTS
-    )
+    trajectories = _simulate(chosen, design)
     settling = chosen.simulation.settling
     return DesignView(
+        values=values,
         design=design,
         trajectories=trajectories,
         tracking={
-            name: tracking_metrics(run, settling=settling)[AXIS]
+            name: next(iter(tracking_metrics(run, settling=settling).values()))
             for name, run in trajectories.items()
         },
     )
@@ -121,8 +129,17 @@ def view_figure(view: DesignView) -> CaptionedFigure:
     """Poles, sensitivity to the heart's motion, force and force error in one picture."""
     figure = new_figure(6.4, "", width=9)
     axes = figure.subplot_mosaic([["poles", "heart"], ["force", "force"], ["error", "error"]])
+    true_loop = loop_on(view.design, view.values.stiffness)
     draw_poles(axes["poles"], view.design)
-    draw_heart_sensitivity(axes["heart"], view.design)
+    axes["poles"].plot(
+        true_loop.poles.real,
+        true_loop.poles.imag,
+        "o",
+        color=COLOURS["adaptive"],
+        fillstyle="none",
+        label="on true $K_s$",
+    )
+    draw_heart_sensitivity(axes["heart"], true_loop, view.values.stiffness)
     for variant in VARIANTS:
         run = view.trajectories[variant.name]
         force, desired = run["force"][:, 0], run["desired_force"][:, 0]
@@ -134,14 +151,15 @@ def view_figure(view: DesignView) -> CaptionedFigure:
     axes["error"].set_ylabel("$y - F_d$ (mN)")
     axes["error"].set_xlabel("time (s)")
     axes["force"].sharex(axes["error"])
-    legend_above(figure, [*axes["poles"].get_lines()[:4], *axes["force"].get_lines()], columns=8)
+    legend_above(figure, [*_labelled(axes["poles"]), *axes["force"].get_lines()], columns=9)
     return figure
 
 
-def _single_axis(values: DesignValues, scenario: Scenario) -> Scenario:
-    steps = scenario.reference.steps[-1]
-    # The scenario's levels, closer together: its own instants lie beyond the short run.
-    times = tuple(DURATION / 4 * k for k in range(len(steps.times)))
+def _labelled(ax: Axes) -> list[Line2D]:
+    return [each for each in ax.get_lines() if not str(each.get_label()).startswith("_")]
+
+
+def _with_values(values: DesignValues, scenario: Scenario) -> Scenario:
     return replace(
         scenario,
         stiffness=values.stiffness,
@@ -153,38 +171,32 @@ def _single_axis(values: DesignValues, scenario: Scenario) -> Scenario:
             observer_pole=values.observer_pole,
         ),
         adaptation=replace(scenario.adaptation, gain=values.adaptation_gain),
-        reference=ForceReference(steps=(replace(steps, times=times),)),
         simulation=replace(scenario.simulation, duration=DURATION),
     )
 
 
-@cache
-def _sliding_mass() -> RobotDynamics:
-    """A mass of 1 kg on a slide, without gravity: the simplest robot with one force axis."""
-    slide = Joint(
-        name="slide",
-        type=JointType.PRISMATIC,
-        alpha=0.0,
-        d=0.0,
-        theta=0.0,
-        r=0.0,
-        home=0.0,
-        drive_inertia=0.0,
-        coulomb_friction=0.0,
-        viscous_friction=0.0,
-        effort_limit=1e6,
-        transmission=1.0,
-    )
-    body = Body(name="mass", mass=1.0, centre_of_mass=np.zeros(3), inertia=np.eye(3))
-    return build_dynamics(
-        RobotDescription(
-            name="single axis",
-            provenance="A unit mass; exact linearisation makes its size immaterial.",
-            joints=(slide,),
-            bodies=(body,),
-            gravity=np.zeros(3),
-            tool_tip=np.zeros(3),
-            tool_axis=np.array([0.0, 0.0, 1.0]),
-            task=TaskDefinition(position=(2,), tool_axis=()),
+def _simulate(scenario: Scenario, design: RSTDesign) -> Mapping[str, Trajectory]:
+    """Every variant on one axis; they share the compiled code and differ in parameters."""
+    steps = [build_step(variant_controller(scenario, design, variant)) for variant in VARIANTS]
+    loops = [
+        build_axis_loop(
+            step, velocity_gain=scenario.design.velocity_gain, stiffness=scenario.stiffness
         )
+        for step in steps
+    ]
+    levels = scenario.reference.steps[-1].levels
+    # The scenario's levels, closer together: its own instants lie beyond the short run.
+    times = tuple(DURATION / 4 * k for k in range(len(levels)))
+    inputs = axis_inputs(
+        steps[0],
+        heart=scenario_motion(scenario).displacement.selected([AXES.index(AXIS)]),
+        reference=StepSequence(times=times, levels=levels).piecewise(DURATION),
+        end=DURATION,
     )
+    choice = scenario.simulation
+    settings = RunSettings(duration=DURATION, step=choice.step, record_period=choice.record_period)
+    engine = build_axis_engine(loops[0], inputs)
+    return {
+        variant.name: simulate_axis(loop, inputs=inputs, settings=settings, engine=engine)
+        for variant, loop in zip(VARIANTS, loops, strict=True)
+    }

@@ -100,6 +100,37 @@ def test_a_thousand_random_problems():
     assert len(refusals) < 250
 
 
+def test_random_sampled_problems_with_and_without_delay():
+    rng = np.random.default_rng(23)
+    domain = Discrete(1e-3)
+
+    def polynomial_in_disc(degree, radius):
+        found = []
+        while len(found) < degree:
+            root = radius * np.sqrt(rng.random()) * np.exp(1j * rng.uniform(0, np.pi))
+            pair = [root, np.conj(root)] if degree - len(found) > 1 else [root.real]
+            found += pair
+        return exact_polynomial(np.atleast_1d(np.real(np.poly(found))).tolist())
+
+    for index in range(120):
+        degree, excess = index % 5 + 1, index % 2
+        process = Process(
+            A=polynomial_in_disc(degree, 1.2),
+            B=poly(0.3) * polynomial_in_disc(int(rng.integers(0, degree)), 2.0),
+            domain=domain,
+        )
+        placement = place(
+            process,
+            Am=polynomial_in_disc(degree + excess, 0.95),
+            Ao=poly(1, 0) ** (degree - 1),  # deadbeat observer
+            pole_excess=excess,
+        )
+        exact = place_poles_exact(placement)
+        assert exact.remainder.is_zero()
+        assert exact.S.degree() <= exact.R.degree() - excess
+        assert place_poles(placement).residual <= 1e-10
+
+
 def test_reported_residual_is_that_of_an_independent_multiplication():
     rng = np.random.default_rng(7)
     for degree in (2, 4, 6, 8):
@@ -287,11 +318,15 @@ class TestCancellation:
 
 
 class TestPrescribedFactors:
-    def test_integrator_rejects_a_constant(self):
-        placement = place(fixed_R=integrator(Continuous()), Ao=poly(1, 10) ** 2)
+    @pytest.mark.parametrize("domain", [Continuous(), Discrete(0.05)])
+    def test_integrator_rejects_a_constant(self, domain):
+        pole = poly(1, 8) if domain.static_point == 0 else poly(1, "-0.2")
+        process = Process.of(A=[1, 3, 2], B=[1, 4], domain=domain)
+        placement = place(process, Am=pole**2, Ao=pole**2, fixed_R=integrator(domain))
         design = place_poles_exact(placement)
         assert design.remainder.is_zero()
-        assert design.loop.disturbance_sensitivity()(0.0) == 0.0
+        assert design.R(domain.static_point) == 0
+        assert design.S(domain.static_point) != 0
 
     @pytest.mark.parametrize("domain", [Continuous(), Discrete(0.05)])
     def test_resonator_in_R_and_notch_in_S(self, domain):

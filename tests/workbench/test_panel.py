@@ -76,6 +76,25 @@ def test_picture_shows_all_variants_below_the_design(scenario, start):
     assert legend.get_window_extent().y0 >= poles.get_window_extent().y1 - 0.5
 
 
+def test_true_stiffness_moves_the_poles(scenario, start):
+    def circles(stiffness):
+        view = design_view(replace(start, stiffness=stiffness), scenario)
+        ax = view_figure(view).axes[0]
+        (line,) = [each for each in ax.get_lines() if each.get_label() == "on true $K_s$"]
+        return line.get_xdata() + 1j * line.get_ydata(), view.design
+
+    at_design, design = circles(scenario.design.stiffness)
+    np.testing.assert_allclose(at_design, design.closed_loop_poles)
+    elsewhere, _ = circles(2 * scenario.design.stiffness)
+    A = np.array([1.0, start.velocity_gain, 0.0])
+    characteristic = np.polyadd(
+        np.polymul(A, design.R), 2 * scenario.design.stiffness * np.array(design.S)
+    )
+    # Residual of each pole against the size of the polynomial's terms there.
+    size = np.polyval(np.abs(characteristic), np.abs(elsewhere))
+    assert np.all(np.abs(np.polyval(characteristic, elsewhere)) < 1e-9 * size)
+
+
 def test_moving_a_slider_redraws_and_reset_returns(scenario, start):
     panel = panel_module.design_panel(scenario)
     before = panel.picture.value

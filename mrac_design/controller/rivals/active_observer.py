@@ -126,6 +126,8 @@ def active_observer(specification: ActiveObserver) -> LinearController:
     )
     estimate = columns.block("estimate")
     rest = {name: np.eye(length)[0] for name, length in columns.state.blocks if "estimate" in name}
+    # Commands of the outer loop are forces, which stay at the reference; those of the inner fade.
+    pending = {name: 0.0 if name == "pending" else 1.0 for name in registers}
     return LinearController(
         time_domain=domain,
         columns=columns,
@@ -133,7 +135,7 @@ def active_observer(specification: ActiveObserver) -> LinearController:
         registers=registers,
         command=command,
         signals={"desired_force": reference.desired(ahead=0), "disturbance_estimate": estimate[2]},
-        rest={**dict.fromkeys(registers, 0.0), **rest, **REST},
+        rest={**pending, **rest, **REST},
     )
 
 

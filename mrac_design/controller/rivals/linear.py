@@ -18,12 +18,15 @@ from dataclasses import dataclass, field
 import casadi as ca
 import control
 import numpy as np
+from numpy.typing import NDArray
 
 from mrac_design.arrays import FloatArray, readonly
 from mrac_design.controller.step import ControllerStep
 from mrac_design.errors import ParameterError
 from mrac_design.layout import Layout
 from mrac_design.time_domain import TimeDomain
+
+Indices = NDArray[np.intp]
 
 
 @dataclass(frozen=True, slots=True)
@@ -181,13 +184,14 @@ def build_linear_step(controller: LinearController) -> ControllerStep:
     )
 
 
-def _free_entries(rows: FloatArray) -> tuple[FloatArray, FloatArray]:
+def _free_entries(rows: FloatArray) -> tuple[Indices, Indices]:
     """Where the coefficients are that are neither 0 nor 1."""
-    return np.nonzero((rows != 0.0) & (rows != 1.0))
+    i, j = np.nonzero((rows != 0.0) & (rows != 1.0))
+    return i, j
 
 
 def _combination(
-    rows: FloatArray, free: tuple[FloatArray, FloatArray], values: ca.SX, vector: ca.SX
+    rows: FloatArray, free: tuple[Indices, Indices], values: ca.SX, vector: ca.SX
 ) -> ca.SX:
     """rows @ vector, with the free entries as symbols."""
     results = [ca.SX(0)] * rows.shape[0]

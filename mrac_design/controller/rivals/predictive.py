@@ -10,12 +10,12 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-import control
 import numpy as np
 
 from mrac_design.arrays import readonly
 from mrac_design.controller.rivals.harmonics import BeatObserver, beat_observer_rows
 from mrac_design.controller.rivals.linear import Columns, LinearController
+from mrac_design.controller.rivals.observation import sampled_plant
 from mrac_design.controller.rivals.prediction import ArimaxModel, Horizon, horizon_gains
 from mrac_design.controller.rivals.reference_rows import PREFILTER, REST, ReferenceRows
 from mrac_design.design import ReferenceModel
@@ -55,16 +55,17 @@ class PredictiveControl:
 
 def predictive_model(specification: PredictiveControl) -> ArimaxModel:
     """The model the controller predicts with."""
-    system = control.c2d(specification.plant.transfer_function(), specification.time_domain.period)
-    B, A = np.atleast_1d(system.num[0][0]), np.atleast_1d(system.den[0][0])
+    plant = sampled_plant(specification.plant, specification.time_domain, delay=0)
+    Φ, Γ, C = plant.transition, plant.input, plant.output
+    trace = float(np.trace(Φ))
     difference = np.array([1.0, -1.0])
     if specification.breath is not None:
         repetition = np.zeros(specification.breath + 1)
         repetition[[0, -1]] = 1.0, -1.0
         difference = np.convolve(difference, repetition)
     return ArimaxModel(
-        A=readonly(A / A[0]),
-        B=readonly(B[-(A.size - 1) :] / A[0]),
+        A=readonly([1.0, -trace, np.linalg.det(Φ)]),
+        B=readonly([C @ Γ, C @ (Φ @ Γ - trace * Γ)]),  # by Cayley–Hamilton
         C=readonly(np.poly(specification.observer_poles)),
         difference=readonly(difference),
         delay=specification.delay,
@@ -102,10 +103,7 @@ def predictive_control(specification: PredictiveControl) -> LinearController:
     increment = gains @ (target - free[horizon.first - 1 :])
     rest = dict.fromkeys(registers, 0.0) | {"forces": 1.0}
     if specification.beat is not None:
-        rest["beat_observer"] = np.eye(columns.state.slices["beat_observer"].stop)[0][
-            : specification.beat.size
-        ]
-        rest |= dict.fromkeys(set(following) - {"prefilter", "beat_observer"}, 0.0)
+        rest["beat_observer"] = np.eye(specification.beat.size)[0]
     return LinearController(
         time_domain=specification.time_domain,
         columns=columns,
