@@ -21,7 +21,7 @@
 # Worth trying:
 #
 # - **$K_2$ to 0**: the low-frequency force error $\propto K_2 r_1/s_1$ vanishes.
-# - **true $K_s$ up**: the poles (circles) wander, the error hardly changes, with or without adaptation.
+# - **true $K_s$ up**: the poles (circles) wander, the error hardly changes, adaptive or not.
 # - **$\hat\gamma$ to 0**: the adaptive controller becomes the frozen one.
 # - **$\omega$ down**: the heart comes through, and the model lags behind the desired force.
 

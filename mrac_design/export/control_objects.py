@@ -69,7 +69,7 @@ def redesigned(gains: GainSet, pieces: LoopPieces) -> GainSet:
     The adapted gains start from the new design's own if they started from the old one's. With
     `loop_pieces(gains)` unchanged it gives `gains` again, exactly for ω and ξ of up to 15
     digits: a polynomial holds only ω² and 2ξω, rounded. Raises ParameterError
-    for pieces of other shapes, IllConditionedError when S/R and T/R do not place the poles.
+    for pieces of other shapes and for S/R and T/R that do not place the poles.
     """
     model = _model(pieces.reference_model)
     R, S = _ratio("S/R", pieces.feedback)

@@ -175,12 +175,13 @@ def _to_matlab(document: Mapping[str, Any]) -> bytes:
     stream = BytesIO()
     savemat(stream, {_MATLAB_NAME: document}, long_field_names=True, oned_as="row")
     # The header is free text, by default the time of writing.
-    return _matlab_header(content := stream.getvalue()[_MATLAB_HEADER_SIZE:]) + content
+    content = stream.getvalue()[_MATLAB_HEADER_SIZE:]
+    return _matlab_header(content) + content
 
 
 def _matlab_header(content: bytes) -> bytes:
     digest = hashlib.sha256(content).hexdigest().encode()
-    return (_MATLAB_HEADER + digest)[:_MATLAB_HEADER_SIZE].ljust(_MATLAB_HEADER_SIZE)
+    return (_MATLAB_HEADER + digest).ljust(_MATLAB_HEADER_SIZE)
 
 
 def _from_matlab(content: bytes) -> Any:

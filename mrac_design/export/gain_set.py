@@ -17,17 +17,15 @@ from pathlib import Path
 
 import numpy as np
 
+from mrac_design.arrays import readonly
 from mrac_design.controller.adaptation import AdaptationLaw
 from mrac_design.controller.adaptive import AdaptiveRST, build_step
 from mrac_design.controller.linearisation import RobotModelError, build_linearisation
 from mrac_design.controller.reference import DirectReference, ModelInverse
 from mrac_design.controller.robot_step import RobotStep, build_robot_step
-from mrac_design.design import PolynomialDesign, ReferenceModel, RSTDesign, RSTSpecification
-from mrac_design.design.polynomial_design import rounded_design
-from mrac_design.design.rst import design_rst
+from mrac_design.design import ReferenceModel, RSTDesign, RSTSpecification, design_rst
 from mrac_design.errors import ModelFileError, ParameterError
-from mrac_design.polynomials.diophantine import RESIDUAL_LIMIT
-from mrac_design.polynomials.rationals import binary_polynomial
+from mrac_design.polynomials.diophantine import RESIDUAL_LIMIT, relative_residual
 from mrac_design.resources import models_directory
 from mrac_design.robot import available_robots, build_dynamics, load_robot
 from mrac_design.simulation.scenario import Scenario
@@ -55,8 +53,8 @@ class RobotFingerprint:
 class GainSet:
     """A tuned controller, the same on every force axis; compares by value.
 
-    Raises ParameterError when a number is out of its range, IllConditionedError when the
-    coefficients do not solve the Diophantine equation of the specification.
+    Raises ParameterError when a number is out of its range or the coefficients do not solve the
+    Diophantine equation of the specification.
     """
 
     scenario: str
@@ -181,15 +179,18 @@ def _design(specification: RSTSpecification, coefficients: tuple[float, ...]) ->
     """The design of `specification` with the given coefficients put in and judged."""
     r1, s0, s1, t0, t1 = coefficients
     solved = design_rst(specification).solved
-    placed: PolynomialDesign = rounded_design(
-        solved,
-        R=binary_polynomial([1.0, r1]),
-        S=binary_polynomial([s0, s1]),
-        residual_limit=RESIDUAL_LIMIT,
-    )
-    T = np.array([t0, t1])
+    R, S, T = np.array([1.0, r1]), np.array([s0, s1]), np.array([t0, t1])
+    problem = specification.placement
+    residual = relative_residual(problem.process.A, problem.process.B, problem.closed_loop, R, S)
+    if not residual <= RESIDUAL_LIMIT:
+        raise ParameterError(
+            "gains",
+            (r1, s0, s1),
+            f"leave a residual of {residual:.2g} in A R + b0 S = Ao Am, more than "
+            f"{RESIDUAL_LIMIT:g}: they do not belong to this design",
+        )
     if not np.allclose(T, solved.T, rtol=_T_TOLERANCE, atol=0.0):
         wanted = ", ".join(f"{value:.9g}" for value in solved.T)
         raise ParameterError("t0, t1", (t0, t1), f"must be ω²/b0 times Ao: {wanted}")
-    T.setflags(write=False)
-    return RSTDesign(specification=specification, solved=replace(placed, T=T))
+    placed = replace(solved, R=readonly(R), S=readonly(S), T=readonly(T), residual=residual)
+    return RSTDesign(specification=specification, solved=placed)

@@ -5,6 +5,7 @@ from __future__ import annotations
 import pickle
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
+from itertools import islice
 
 from mrac_design.arrays import FloatArray
 from mrac_design.errors import EnsembleError
@@ -53,7 +54,7 @@ class DaskCluster:
 
             ahead = 4 * max(1, sum(client.nthreads().values()))
             pending = as_completed(
-                [submit(number) for number, _ in zip(waiting, range(ahead), strict=False)]
+                [submit(number) for number in islice(waiting, ahead)]
             )
             try:
                 for future in pending:

@@ -72,9 +72,10 @@ class NativeEngine:
     name: str
     """Shown to people."""
 
-    def __init__(self, entry: Any, outputs: int) -> None:
+    def __init__(self, entry: Any, *, outputs: int, powers: int) -> None:
         self._run = entry
         self._outputs = outputs
+        self._powers = powers
 
     def run(
         self,
@@ -85,6 +86,7 @@ class NativeEngine:
         state: FloatArray,
         held: FloatArray,
     ) -> FloatArray:
+        assert coefficients.shape[2] == self._powers, "inputs of another degree"
         recorded = np.empty((int(schedule.records[part].sum()), self._outputs))
         arrays = (coefficients, parameters, state, held, recorded)
         rows = run_part(self._run, schedule, part, *arrays)
@@ -101,7 +103,9 @@ class CompiledEngine(NativeEngine):
         self, system: HybridSystem, method: Method, *, input_powers: int, compiler: str
     ) -> None:
         library = compile_library(c_program(system, method, input_powers=input_powers), compiler)
-        super().__init__(run_entry(library.run), system.outputs.size)
+        super().__init__(
+            run_entry(library.run), outputs=system.outputs.size, powers=input_powers
+        )
 
 
 class LlvmEngine(NativeEngine):
@@ -112,7 +116,7 @@ class LlvmEngine(NativeEngine):
     def __init__(self, system: HybridSystem, method: Method, *, input_powers: int) -> None:
         self._module = LlvmModule(llvm_program(system, method, input_powers=input_powers))
         entry = ctypes.CFUNCTYPE(ctypes.c_long)(self._module.address("run"))
-        super().__init__(run_entry(entry), system.outputs.size)
+        super().__init__(run_entry(entry), outputs=system.outputs.size, powers=input_powers)
 
 
 def run_entry(address: Any) -> Any:

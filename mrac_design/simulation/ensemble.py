@@ -16,6 +16,7 @@ from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import FIRST_COMPLETED, ThreadPoolExecutor, wait
 from dataclasses import dataclass
 from functools import lru_cache
+from itertools import islice
 from typing import Protocol
 
 import numpy as np
@@ -133,7 +134,7 @@ class LocalThreads:
             waiting = iter(chunks)
             running = {
                 pool.submit(_numbered, ensemble, engine, number)
-                for number, _ in zip(waiting, range(2 * count), strict=False)
+                for number in islice(waiting, 2 * count)
             }
             try:
                 while running:
@@ -183,6 +184,7 @@ def run_ensemble(
             count += 1
             if progress is not None:
                 progress(count / ensemble.chunks)
+    assert count == ensemble.chunks, f"{ensemble.chunks - count} chunks were not computed"
     return EnsembleResult(metrics=ensemble.reduction.metrics, table=table)
 
 

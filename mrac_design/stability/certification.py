@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from dataclasses import dataclass
 from math import ceil, floor, log10, sqrt
+from typing import TypeVar
 
 from flint import fmpq
 
@@ -38,17 +39,20 @@ from mrac_design.stability.inequalities import (
     Corner,
     Increment,
     decay_blocks,
+    derivative,
     energy_blocks,
     floating_corner,
     peak_blocks,
 )
-from mrac_design.stability.semidefinite import Candidate, least_scalar, widest_margin
+from mrac_design.stability.semidefinite import Blocks, Candidate, least_scalar, widest_margin
 from mrac_design.time_domain import Continuous
 from mrac_design.verdict import Verdict
 
+GainClaim = TypeVar("GainClaim", EnergyClaim, PeakClaim)
+
 ROUNDING_BITS = 44
 """Binary places a Lyapunov matrix keeps below its largest entry."""
-PEAK_RATES = (0.05, 0.1, 0.2, 0.3, 0.45, 0.6, 0.75, 0.9)
+PEAK_RATES = (0.15, 0.35, 0.55, 0.7, 0.85)
 """Shares of the certified decay tried as the rate of the peak bound."""
 SLACKS = (1.002, 1.02, 1.2)
 """Inflation of a solver's gain, tried in turn until the exact check passes."""
@@ -171,19 +175,19 @@ def _without_proof(loop: AdaptiveLoop, box: ParameterBox, timing: Timing) -> Sta
 
 
 def _fastest_decay(polytope: _Polytope) -> DecayClaim | None:
-    """The largest proved decay, to 3 % of itself; the rate keeps three significant digits."""
+    """The largest proved decay, by bisection."""
     best = _decay_at(polytope, 0.0)
     if best is None:
         return None
-    low, high = 0.0, 2.0 if polytope.increment.__name__ == "derivative" else 1.0
-    for _ in range(8):
+    low, high = 0.0, 2.0 if polytope.increment is derivative else 1.0
+    for _ in range(7):
         middle = (low + high) / 2
         claim = _decay_at(polytope, middle)
         if claim is None:
             high = middle
         else:
             low, best = middle, claim
-    return best if best.rate > 0 else _decay_at(polytope, high / 16)
+    return best
 
 
 def _decay_at(polytope: _Polytope, rate: float) -> DecayClaim | None:
@@ -213,26 +217,23 @@ def _least_energy_gain(polytope: _Polytope, output: Output) -> EnergyClaim | Non
         P = rounded_symmetric(candidate.P, ROUNDING_BITS)
         return EnergyClaim(P=P, output=output, gain=gain)
 
-    result = _least_gain(polytope, blocks, claim)
-    return result if isinstance(result, EnergyClaim) else None
+    least = least_scalar(blocks, polytope.size)
+    return None if least is None else _proved_gain(polytope, blocks, claim, least.scalar)
 
 
 def _least_peak_gain(polytope: _Polytope, decay: fmpq) -> PeakClaim | None:
     """The smallest proved peak bound over a few rates of the invariant ellipsoid."""
     fastest = int(decay.p) / int(decay.q)
     rates = [fmpq(ceil(share * fastest * 10**6), 10**6) for share in PEAK_RATES]
-    bounds = [(_peak_candidate(polytope, rate), rate) for rate in rates]
-    ranked = sorted(
-        (found.scalar, rate) for found, rate in bounds if found is not None and found.scalar > 0
-    )
-    for _, rate in ranked:
-        result = _peak_at(polytope, rate)
+    bounds = [(least_scalar(_peak_blocks(polytope, rate), polytope.size), rate) for rate in rates]
+    for squared, rate in sorted((found.scalar, rate) for found, rate in bounds if found):
+        result = _peak_at(polytope, rate, squared)
         if result is not None:
             return result
     return None
 
 
-def _peak_blocks(polytope: _Polytope, rate: fmpq) -> Callable[..., list[FloatArray]]:
+def _peak_blocks(polytope: _Polytope, rate: fmpq) -> Blocks:
     floating = int(rate.p) / int(rate.q)
 
     def blocks(P: FloatArray, squared: float) -> list[FloatArray]:
@@ -244,31 +245,25 @@ def _peak_blocks(polytope: _Polytope, rate: fmpq) -> Callable[..., list[FloatArr
     return blocks
 
 
-def _peak_candidate(polytope: _Polytope, rate: fmpq) -> Candidate | None:
-    return least_scalar(_peak_blocks(polytope, rate), polytope.size)
-
-
-def _peak_at(polytope: _Polytope, rate: fmpq) -> PeakClaim | None:
+def _peak_at(polytope: _Polytope, rate: fmpq, squared: float) -> PeakClaim | None:
     def claim(candidate: Candidate, gain: fmpq) -> PeakClaim:
         return PeakClaim(P=rounded_symmetric(candidate.P, ROUNDING_BITS), rate=rate, gain=gain)
 
-    result = _least_gain(polytope, _peak_blocks(polytope, rate), claim)
-    return result if isinstance(result, PeakClaim) else None
+    return _proved_gain(polytope, _peak_blocks(polytope, rate), claim, squared)
 
 
-def _least_gain(
+def _proved_gain(
     polytope: _Polytope,
-    blocks: Callable[[FloatArray, float], Sequence[FloatArray]],
-    claim: Callable[[Candidate, fmpq], Claim],
-) -> Claim | None:
-    """Minimise a gain, step back from the optimum, and prove what is left."""
-    least = least_scalar(blocks, polytope.size)
-    if least is None or not least.scalar > 0:
+    blocks: Blocks,
+    claim: Callable[[Candidate, fmpq], GainClaim],
+    squared: float,
+) -> GainClaim | None:
+    """Step back from the solver's optimum until the rounded claim is proved."""
+    if squared <= 0:
         return None
     for slack in SLACKS:
-        gain = _rounded_up(sqrt(least.scalar) * slack)
-        squared = (int(gain.p) / int(gain.q)) ** 2
-        candidate = widest_margin(blocks, polytope.size, scalar=squared)
+        gain = _rounded_up(sqrt(squared) * slack)
+        candidate = widest_margin(blocks, polytope.size, scalar=(int(gain.p) / int(gain.q)) ** 2)
         if candidate is not None:
             found = claim(candidate, gain)
             if polytope.proved(found):

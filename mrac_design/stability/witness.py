@@ -172,6 +172,8 @@ def _storage_matrix(N: fmpq_poly, D: fmpq_poly) -> fmpq_mat:
 
 def _dissipation(supply: fmpq_poly) -> tuple[fmpq_poly, fmpq_poly]:
     """(F, e) with supply(ω²) = |F(jω)|² + Σ e_k ω²ᵏ and every e_k > 0."""
+    if sign_on_interval(supply, fmpq(0)).sign is not Sign.POSITIVE:
+        raise ValueError("a storage function needs Re G > 0 on the whole boundary")
     degree = supply.degree()
     shape = _slack_shape(supply)
     share = fmpq(1, 4)

@@ -11,7 +11,7 @@ from typing import Any
 
 from flint import fmpq
 
-_RATIONAL = re.compile(r"-?[0-9]+(/[1-9][0-9]*)?")
+_RATIONAL = re.compile(r"-?[0-9]{1,4000}(/[1-9][0-9]{0,3999})?")
 
 
 class DocumentError(Exception):

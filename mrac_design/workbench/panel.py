@@ -44,7 +44,9 @@ class DesignPanel:
         for slider in self.sliders.values():
             slider.observe(self._changed, names="value")
         self.reset.on_click(lambda _: self._set(start))
-        controls = widgets.VBox([*self.sliders.values(), self.reset])
+        # Without a basis of its own the picture squeezes the sliders' readouts away.
+        narrow = widgets.Layout(flex="0 0 22em", overflow="hidden")
+        controls = widgets.VBox([*self.sliders.values(), self.reset], layout=narrow)
         answer = widgets.VBox([self.summary, self.message, self.picture])
         self.widget = widgets.HBox([controls, answer])
         self.redraw()

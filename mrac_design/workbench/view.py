@@ -151,7 +151,7 @@ def view_figure(view: DesignView) -> CaptionedFigure:
     axes["error"].set_ylabel("$y - F_d$ (mN)")
     axes["error"].set_xlabel("time (s)")
     axes["force"].sharex(axes["error"])
-    legend_above(figure, [*_labelled(axes["poles"]), *axes["force"].get_lines()], columns=9)
+    legend_above(figure, [*_labelled(axes["poles"]), *axes["force"].get_lines()], columns=5)
     return figure
 
 

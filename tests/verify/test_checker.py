@@ -153,6 +153,8 @@ def test_missing_and_malformed_parts_are_findings(path) -> None:
         copy = {k: v for k, v in document.items() if k != key}
         assert not checked(copy, path)[0].accepted
     assert not checked(resealed(replaced(document, ("box", "lower", 0), "0.5x")), path)[0].accepted
+    endless = resealed(replaced(document, ("box", "lower", 0), "9" * 5000))
+    assert not checked(endless, path)[0].accepted
     broken = path.with_name("broken.json")
     broken.write_text('{"format": ')
     assert "not a JSON" in verify_certificate(broken).findings[0].problem

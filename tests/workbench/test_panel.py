@@ -74,6 +74,7 @@ def test_picture_shows_all_variants_below_the_design(scenario, start):
     assert len(error.get_lines()) == 3
     (legend,) = figure.legends
     assert legend.get_window_extent().y0 >= poles.get_window_extent().y1 - 0.5
+    assert legend.get_window_extent().x1 <= figure.bbox.x1
 
 
 def test_true_stiffness_moves_the_poles(scenario, start):

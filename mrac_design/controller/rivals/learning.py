@@ -131,7 +131,8 @@ def learning_convergence(
         [1.0], [1.0] + [0.0] * delay, h
     )
     Kp, Ki = specification.proportional, specification.integral
-    C = control.TransferFunction([Kp, Ki * h - Kp], [1.0, -1.0], h)
+    # Without integral action the integrator is no part of the loop.
+    C = control.TransferFunction([Kp, Ki * h - Kp], [1.0, -1.0], h) if Ki else Kp
     closed = control.feedback(G, C)
     frequency = np.linspace(0.0, 0.5 / h, points + 1)[1:]
     z = np.exp(2j * np.pi * frequency * h)

@@ -63,7 +63,7 @@ PREDICTIVE = PredictiveControl(
     time_domain=DOMAIN,
     delay=DELAY,
 )
-BEAT = BeatObserver(frequency=1.25, harmonics=3, drive=1e-3, slow_drive=0.3, force_noise=0.02)
+BEAT = BeatObserver(frequency=1.25, harmonics=3, drive=1e-2, slow_drive=0.01, force_noise=0.02)
 PREDICTIVE_OBSERVER = PredictiveObserver(
     plant=PLANT,
     horizon=Horizon(first=1, last=12, moves=2, penalty=1e-6),
@@ -75,13 +75,13 @@ PREDICTIVE_OBSERVER = PredictiveObserver(
     delay=DELAY,
 )
 LEARNING = IterativeLearning(
-    proportional=30.0,
-    integral=100.0,
-    learning=15.0,
-    lead=5,
-    repetition=200,
+    proportional=2.0,
+    integral=5.0,
+    learning=1.0,
+    lead=25,
+    repetition=400,
     cutoff=12.0,
-    half_width=60,
+    half_width=100,
     prefilter=PREFILTER,
     time_domain=DOMAIN,
 )
