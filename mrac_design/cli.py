@@ -17,6 +17,7 @@ from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn
 from rich.table import Table
 
 from mrac_design.cli_certify import certify, verify
+from mrac_design.cli_export import export
 from mrac_design.cli_options import DesignOptions, StudyOptions, takes
 from mrac_design.errors import MracDesignError
 
@@ -171,6 +172,7 @@ def check_model(
     _output.print(table)
 
 
+app.command()(export)
 app.command()(certify)
 app.command()(verify)
 

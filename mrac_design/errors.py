@@ -159,6 +159,10 @@ class SimulationError(MracDesignError):
     """A simulation left the range of finite numbers."""
 
 
+class RealtimeError(MracDesignError):
+    """The real-time runner cannot be built or run on this machine."""
+
+
 class EnsembleError(MracDesignError):
     """An ensemble cannot start, go on from its store, or reach its cluster."""
 

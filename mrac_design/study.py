@@ -4,11 +4,12 @@ from __future__ import annotations
 
 import logging
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
 
+from mrac_design.arrays import readonly
 from mrac_design.controller.adaptive import AdaptiveRST, build_step, nominal_gains
 from mrac_design.controller.linearisation import build_linearisation, home_task_position
 from mrac_design.controller.reference import DirectReference, ModelInverse, ReferenceFeedforward
@@ -16,18 +17,16 @@ from mrac_design.design import ReferenceModel, RSTDesign, RSTSpecification, desi
 from mrac_design.errors import ScenarioFileError
 from mrac_design.metrics.tracking import TrackingMetrics, max_torque, tracking_metrics
 from mrac_design.motion import HeartMotion, available_motions, load_motion, read_recorded_motion
-from mrac_design.motion.signal import PiecewisePolynomial, stack
+from mrac_design.motion.signal import PiecewisePolynomial
 from mrac_design.plant import ForcePlant
 from mrac_design.robot import RobotDescription, RobotDynamics, build_dynamics, load_robot
 from mrac_design.robot.posture import condition_numbers
-from mrac_design.simulation.closed_loop import ForceLoop, build_force_loop, resting_state
-from mrac_design.simulation.engine import Engine, build_engine
-from mrac_design.simulation.readout import force_loop_trajectory
-from mrac_design.simulation.run import Progress, RunSettings, run
+from mrac_design.simulation.engine import Engine
+from mrac_design.simulation.run import Progress
 from mrac_design.simulation.scenario import Scenario
-from mrac_design.simulation.tableau import RK4
+from mrac_design.simulation.scenario_run import ready_loop, scenario_inputs, simulate
 from mrac_design.simulation.trajectory import Trajectory
-from mrac_design.time_domain import Continuous
+from mrac_design.time_domain import Continuous, TimeDomain
 
 _LOG = logging.getLogger(__name__)
 
@@ -134,15 +133,16 @@ def scenario_design(scenario: Scenario) -> RSTDesign:
 
 
 def variant_controller(scenario: Scenario, design: RSTDesign, variant: Variant) -> AdaptiveRST:
-    """The axis controller of a variant, the same on every force axis."""
+    """The axis controller of a variant in continuous time, the same on every force axis."""
     gain = scenario.adaptation.gain if variant.adapts else 0.0
+    nominal = nominal_gains(design)
     return AdaptiveRST(
         design=design,
         prefilter=scenario.prefilter,
-        law=scenario.adaptation.build(gain),
+        law=scenario.adaptation.build(gain, nominal=nominal),
         feedforward=variant.feedforward,
         bias_force=scenario.adaptation.bias_force,
-        initial_gains=nominal_gains(design),
+        initial_gains=nominal,
         time_domain=Continuous(),
     )
 
@@ -164,26 +164,37 @@ def simulate_variants(
         model_error=scenario.model_error,
     )
     inputs = exogenous_inputs(scenario, dynamics, motion)
+    axes = len(dynamics.description.force_axes)
     engine: Engine | None = None
     trajectories = {}
     for number, variant in enumerate(variants):
-        step = build_step(variant_controller(scenario, design, variant))
-        axes = len(dynamics.description.force_axes)
-        loop = build_force_loop(
-            dynamics, linearisation, [step] * axes, stiffness=scenario.stiffness
+        controller = variant_controller(scenario, design, variant)
+        ready = ready_loop(
+            scenario,
+            dynamics,
+            linearisation,
+            build_step(replace(controller, time_domain=controller_domain(scenario))),
+            force=readonly(inputs(0.0)[axes : 2 * axes, 0]),
         )
-        engine = engine or build_engine(loop.system, RK4, input_powers=inputs.degree + 1)
         share = None if progress is None else _share(progress, number, len(variants))
-        trajectories[variant.name] = _simulate(scenario, loop, engine, inputs, share)
+        trajectories[variant.name], engine = simulate(
+            scenario, ready, inputs, engine=engine, progress=share
+        )
     return trajectories
+
+
+def controller_domain(scenario: Scenario) -> TimeDomain:
+    """The time domain the scenario's controller runs in."""
+    sampling = scenario.sampling
+    return sampling if isinstance(sampling, Continuous) else sampling.domain
 
 
 def exogenous_inputs(
     scenario: Scenario, dynamics: RobotDynamics, motion: HeartMotion
 ) -> PiecewisePolynomial:
-    """Heart position (m) and force reference (N), k channels each, over the whole run.
+    """Heart position (m), force reference (N), k channels each, and what else the loop takes.
 
-    The heart lies where the spring carries the first reference when the tip is at home, so the
+    The heart lies where the tissue carries the first reference when the tip is at home, so the
     run starts in equilibrium but for the heart's velocity.
     """
     duration = scenario.simulation.duration
@@ -192,37 +203,9 @@ def exogenous_inputs(
     displacement = motion.displacement.restricted(0.0, duration).selected(axes)
     tip = home_task_position(dynamics)[: len(axes)]
     start = displacement(0.0)[:, 0]
-    rest = tip - reference(0.0)[:, 0] / scenario.stiffness
-    return stack(displacement.shifted(rest - start), reference)
-
-
-def _simulate(
-    scenario: Scenario,
-    loop: ForceLoop,
-    engine: Engine,
-    inputs: PiecewisePolynomial,
-    progress: Progress | None,
-) -> Trajectory:
-    axes = len(loop.controllers)
-    choice = scenario.simulation
-    initial = resting_state(
-        loop,
-        posture=loop.dynamics.description.home,
-        force=inputs(0.0)[axes:, 0],
-        condition_limit=choice.condition_limit,
-    )
-    recording = run(
-        engine,
-        loop.system,
-        inputs=inputs,
-        parameters=loop.parameter_values,
-        initial_state=initial,
-        settings=RunSettings(
-            duration=choice.duration, step=choice.step, record_period=choice.record_period
-        ),
-        progress=progress,
-    )
-    return force_loop_trajectory(loop, recording, engine=engine.name)
+    contact = scenario.contact.build(scenario.stiffness)
+    rest = tip - contact.rest_depth(reference(0.0)[:, 0])
+    return scenario_inputs(scenario, displacement.shifted(rest - start), reference)
 
 
 def _check_axes(scenario: Scenario, robot: RobotDescription) -> None:

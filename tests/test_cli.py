@@ -83,7 +83,10 @@ def test_check_model_names_what_the_robot_is(mrac):
     assert mrac("check-model", "planar_2r")[0] == 0
 
 
-@pytest.mark.parametrize("command", [(), ("report",), ("simulate",), ("design",), ("check-model",)])
+COMMANDS = ("report", "simulate", "design", "check-model", "export", "certify", "verify")
+
+
+@pytest.mark.parametrize("command", [(), *((name,) for name in COMMANDS)])
 def test_every_command_explains_itself(mrac, command):
     status, text, _ = mrac(*command, "--help")
     assert status == 0

@@ -9,7 +9,6 @@ import casadi as ca
 
 from mrac_design.codegen.straight_line import CONSTANT, FMA, FMS, FNMA, INPUT, StraightLine
 
-
 _FUSED: dict[int, Callable[[ca.SX, ca.SX], ca.SX]] = {
     FMA: lambda product, c: product + c,
     FMS: lambda product, c: product - c,

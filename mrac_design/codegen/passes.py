@@ -48,9 +48,7 @@ def fuse_products(program: StraightLine) -> StraightLine:
     Processors do it in the time of the product alone, and it is more accurate. Where a processor
     cannot, generated code falls back to two roundings.
     """
-    uses = Counter(
-        j for node in program.nodes if node.operation != INPUT for j in node.arguments
-    )
+    uses = Counter(j for node in program.nodes if node.operation != INPUT for j in node.arguments)
     uses.update(i for _, entries in program.outputs for i in entries)
 
     def product(i: int) -> tuple[int, ...] | None:

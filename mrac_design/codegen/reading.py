@@ -22,9 +22,7 @@ def read_function(function: ca.Function, *, inputs: Sequence[str] | None = None)
     """
     builder = Builder()
     names = function.name_in() if inputs is None else inputs
-    arguments = [
-        builder.input(name, function.numel_in(i)) for i, name in enumerate(names)
-    ]
+    arguments = [builder.input(name, function.numel_in(i)) for i, name in enumerate(names)]
     outputs = call_function(builder, function, arguments)
     return builder.finish(dict(zip(function.name_out(), outputs, strict=True)))
 
@@ -46,7 +44,7 @@ def call_function(
         elif operation == ca.OP_INPUT:
             work[target[0]] = arguments[source[0]][rows[source[0]][source[1]]]
         elif operation == ca.OP_CONST:
-            work[target[0]] = builder.constant(function.instruction_constant(k))
+            work[target[0]] = builder.constant(_snapped(function.instruction_constant(k)))
         else:
             work[target[0]] = builder.apply(operation, *(work[i] for i in source))
     return outputs
@@ -70,6 +68,17 @@ def call_program(
 def operations_as_written(function: ca.Function) -> OperationCount:
     """Arithmetic of an SX function before anything is shared or simplified."""
     return count_operations(function.instruction_id(k) for k in range(function.n_instructions()))
+
+
+def _snapped(value: float) -> float:
+    """Constants meant to be 0, 1 or −1, made so: cos(π/2), sin(π), a product of such.
+
+    Rounding leaves them within two units in the last place of 1; smaller numbers were meant.
+    """
+    for exact in (0.0, 1.0, -1.0):
+        if 1e-17 < abs(value - exact) < 2.5e-16:
+            return exact
+    return value
 
 
 def _dense_places(sparsity: ca.Sparsity) -> list[int]:

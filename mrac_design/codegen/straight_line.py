@@ -23,8 +23,6 @@ _SELECTIONS = (
     ca.OP_COPYSIGN,
 )  # fmt: skip
 _COMMUTATIVE = (ca.OP_ADD, ca.OP_MUL, ca.OP_EQ, ca.OP_NE, ca.OP_AND, ca.OP_OR)
-SNAP = 2.5e-16
-"""Constants this near to 0, 1 or −1 are meant to be it: cos(π/2), sin(π), a product of cosines."""
 
 
 class Node(NamedTuple):
@@ -122,9 +120,6 @@ class Builder:
 
     def constant(self, value: float) -> int:
         """Position of a constant."""
-        for exact in (0.0, 1.0, -1.0):
-            if abs(value - exact) <= SNAP:
-                return self._make(CONSTANT, (), exact)
         return self._make(CONSTANT, (), float(value))
 
     def value_of(self, position: int) -> float | None:

@@ -49,8 +49,7 @@ class SeriesEvaluator:
                 self._moves.append(moving[arguments[0]])
             else:
                 self._moves.append(
-                    operation not in _PIECEWISE_CONSTANT
-                    and any(self._moves[j] for j in arguments)
+                    operation not in _PIECEWISE_CONSTANT and any(self._moves[j] for j in arguments)
                 )
 
     def advance(self) -> dict[str, list[int]]:
@@ -118,7 +117,7 @@ class SeriesEvaluator:
         build = self._builder
         half = self._convolution(a, a, low, (k - 1) // 2, k)
         twice = build.add(half, half)
-        if k % 2 == 0 and k // 2 >= low:
+        if k % 2 == 0 and low <= k // 2 < len(a):
             return build.add(twice, build.multiply(a[k // 2], a[k // 2]))
         return twice
 
@@ -203,9 +202,7 @@ class SeriesEvaluator:
             term = self._square_sum(argument, 0, m)
             scale.append(build.add(build.constant(1.0), term) if m == 0 else term)
         known = self._convolution(self._slopes(i), scale, 1, k - 1, k)
-        rest = build.subtract(
-            self._coefficient(arguments[0], k), self._scaled(1 / k, known)
-        )
+        rest = build.subtract(self._coefficient(arguments[0], k), self._scaled(1 / k, known))
         return build.multiply(rest, self._reciprocal(scale[0]))
 
     def _power(self, i: int, arguments: tuple[int, ...], k: int) -> int:

@@ -3,8 +3,8 @@
 The mathematics libraries of three machines differ in the last bit, and none of them does eight
 numbers at once. This one is the same everywhere: reduction by multiples of π/2 in three parts
 (Cody and Waite 1980), then the minimax polynomials of fdlibm (Sun Microsystems 1993), no branch.
-The error is below 1.5 units in the last place for |x| < 10⁶; beyond, the argument is in effect
-rounded to double precision once more.
+The error is below 1.5 units in the last place for |x| < 10⁶; beyond, it grows as the argument's
+own rounding would make it, and beyond 10¹⁵ the results are bounded but meaningless.
 """
 
 from __future__ import annotations
@@ -67,6 +67,9 @@ def sine_and_cosine(builder: Builder, angle: int) -> tuple[int, int]:
     rest = angle
     for part in _HALF_PI:
         rest = subtract(rest, multiply(quarter_turns, builder.constant(part)))
+    # Nothing but a diverged run has an angle whose reduction fails: keep its sine bounded.
+    for operation, limit in ((ca.OP_FMIN, 1.0), (ca.OP_FMAX, -1.0)):
+        rest = builder.apply(operation, rest, builder.constant(limit))
     square = multiply(rest, rest)
     odd = _horner(builder, _SINE, square)
     sine = add(rest, multiply(multiply(rest, square), odd))

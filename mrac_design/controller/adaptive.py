@@ -24,6 +24,13 @@ import numpy as np
 from mrac_design.arrays import FloatArray, readonly
 from mrac_design.controller.adaptation import AdaptationLaw, AdaptationSignals
 from mrac_design.controller.advance import integral_advance, linear_advance
+from mrac_design.controller.oscillator import (
+    HarmonicSignals,
+    Oscillator,
+    harmonic_signals,
+    oscillator_advance,
+    oscillator_values,
+)
 from mrac_design.controller.reference import ReferenceFeedforward
 from mrac_design.controller.step import ControllerStep
 from mrac_design.design import ReferenceModel, RSTDesign
@@ -72,6 +79,8 @@ class AdaptiveRST:
     """Scaled gains at the start, θ̂(0) = D⁻¹θ(0), 5 values; the design's own are `nominal_gains`."""
     time_domain: TimeDomain
     """Continuous, or sampled with a period."""
+    oscillator: Oscillator | None = None
+    """Harmonics of a periodic motion as further regressors; none leaves them out."""
 
     def __post_init__(self) -> None:
         if len(self.initial_gains) != 5 or not np.all(np.isfinite(self.initial_gains)):
@@ -92,18 +101,25 @@ def nominal_gains(design: RSTDesign) -> tuple[float, ...]:
 def build_step(controller: AdaptiveRST) -> ControllerStep:
     """The controller as CasADi functions; see `ControllerStep` for shapes and units."""
     values = _parameter_values(controller)
+    layout, reported = _layouts(controller)
     parameters = Layout(tuple((name, value.size) for name, value in values.items()))
-    x, p = _STATE.symbols("state"), parameters.symbols("parameters")
+    x, p = layout.symbols("state"), parameters.symbols("parameters")
     force, reference, applied = (ca.SX.sym(n) for n in ("force", "reference", "applied_command"))
-    state, symbols = _STATE.split(x), parameters.split(p)
+    state, symbols = layout.split(x), parameters.split(p)
 
     reference_signal = _reference_path(state, symbols, reference)
-    coarse = _filtered_signals(state, symbols, force, reference_signal.input)
+    harmonic = _harmonic_signals(controller, state, symbols)
+    scaling = _joined(symbols, "scaling", "harmonic_scaling")
+    coarse = ca.vertcat(
+        _filtered_signals(state, symbols, force, reference_signal.input), harmonic.coarse
+    )
     law = controller.law
-    gains = law.confined(symbols, state["gains"])
-    command = -ca.dot(symbols["scaling"] * gains, coarse)
+    moving = _joined(state, "gains", "harmonic_gains")
+    gains = law.confined(symbols, moving)
+    command = -ca.dot(scaling * gains, coarse)
 
-    regressor = symbols["b0"] * symbols["scaling"] * _regressor(state, symbols)
+    filtered = ca.vertcat(_regressor(state, symbols), harmonic.regressor)
+    regressor = symbols["b0"] * scaling * filtered
     command_over_p1 = state["filtered_command"][1] + symbols["ao"] * state["filtered_command"][2]
     augmentation = -(symbols["b0"] * command_over_p1 + ca.dot(regressor, gains))
     error = force - state["model"][1] + augmentation
@@ -114,31 +130,35 @@ def build_step(controller: AdaptiveRST) -> ControllerStep:
         ),
     )
 
-    following = _STATE.join(
+    advanced = _advanced_gains(controller, symbols, moving, rate)
+    own = len(GAIN_NAMES)
+    following = layout.join(
         {
             "filtered_command": _filter(symbols, state["filtered_command"], applied),
             "filtered_force": _filter(symbols, state["filtered_force"], force),
             "filtered_reference": _filter(
                 symbols, state["filtered_reference"], reference_signal.input
             ),
-            "gains": _advanced_gains(controller, symbols, state["gains"], rate),
+            "gains": advanced[:own],
             "model": _second_order_step(symbols, "model", state["model"], reference_signal.input),
             "prefilter": _second_order_step(symbols, "prefilter", state["prefilter"], reference),
+            **_oscillator_following(controller, symbols, state, gains, rate, advanced),
         }
     )
-    signals = _SIGNALS.join(
+    signals = reported.join(
         {
             "desired_force": reference_signal.desired,
             "model_force": state["model"][1],
             "augmented_error": error,
-            "adapted_gains": gains,
+            "adapted_gains": gains[:own],
+            **({"heart_rate": state["oscillator"][1]} if controller.oscillator else {}),
         }
     )
     names = ["state", "force", "reference"]
     return ControllerStep(
-        state=_STATE,
+        state=layout,
         parameters=parameters,
-        signals=_SIGNALS,
+        signals=reported,
         parameter_values=parameters.pack(values),
         command=ca.Function(
             "command", [x, force, reference, p], [command], [*names, "parameters"], ["command"]
@@ -150,8 +170,57 @@ def build_step(controller: AdaptiveRST) -> ControllerStep:
             [*names, "applied_command", "parameters"],
             ["next", "signals"],
         ),
-        equilibrium=_equilibrium(parameters, symbols, p),
+        equilibrium=_equilibrium(layout, symbols, p),
     )
+
+
+def _layouts(controller: AdaptiveRST) -> tuple[Layout, Layout]:
+    """State and signals, with those of the oscillator if there is one."""
+    if controller.oscillator is None:
+        return _STATE, _SIGNALS
+    return (
+        Layout((*_STATE.blocks, *controller.oscillator.blocks)),
+        Layout((*_SIGNALS.blocks, ("heart_rate", 1))),
+    )
+
+
+def _joined(blocks: Mapping[str, ca.SX], first: str, second: str) -> ca.SX:
+    """A block and, if it is there, the harmonics' part."""
+    return ca.vertcat(blocks[first], blocks[second]) if second in blocks else blocks[first]
+
+
+def _harmonic_signals(
+    controller: AdaptiveRST, state: Mapping[str, ca.SX], symbols: Mapping[str, ca.SX]
+) -> HarmonicSignals:
+    if controller.oscillator is None:
+        return HarmonicSignals(ca.SX(0, 1), ca.SX(0, 1))
+    return harmonic_signals(
+        controller.oscillator, symbols, state["oscillator"], symbols["model_damping"]
+    )
+
+
+def _oscillator_following(
+    controller: AdaptiveRST,
+    symbols: Mapping[str, ca.SX],
+    state: Mapping[str, ca.SX],
+    gains: ca.SX,
+    rate: ca.SX,
+    advanced: ca.SX,
+) -> Mapping[str, ca.SX]:
+    if controller.oscillator is None:
+        return {}
+    own = len(GAIN_NAMES)
+    return {
+        "harmonic_gains": advanced[own:],
+        "oscillator": oscillator_advance(
+            controller.oscillator,
+            controller.time_domain,
+            symbols,
+            state["oscillator"],
+            gains[own:],
+            rate[own:],
+        ),
+    }
 
 
 def _advanced_gains(
@@ -172,7 +241,7 @@ def _parameter_values(controller: AdaptiveRST) -> Mapping[str, FloatArray]:
     c1, c2 = controller.feedforward.weights(model)
     # The bias enters like a constant that has passed 1/(Ao Am): its scaled regressor is a force.
     bias_scale = ao * model.bandwidth**2 / specification.plant.b0 * controller.bias_force
-    values = {
+    values: dict[str, Any] = {
         "bandwidth": model.bandwidth,
         "ao": ao,
         "b0": specification.plant.b0,
@@ -184,8 +253,18 @@ def _parameter_values(controller: AdaptiveRST) -> Mapping[str, FloatArray]:
         "feedforward": [c1, c2],
         "initial_gains": [*controller.initial_gains, 0.0],
         **_prefilter_values(controller.prefilter, domain),
-        **controller.law.parameters(len(GAIN_NAMES)),
     }
+    size = len(GAIN_NAMES)
+    if controller.oscillator is not None:
+        size += 2 * controller.oscillator.harmonics
+        values["model_damping"] = 2 * model.damping * model.bandwidth
+        values |= oscillator_values(
+            controller.oscillator,
+            observer_pole=ao,
+            bandwidth=model.bandwidth,
+            b0=specification.plant.b0,
+        )
+    values |= controller.law.parameters(size)
     return {name: readonly(np.ravel(value)) for name, value in values.items()}
 
 
@@ -261,20 +340,23 @@ def _second_order_step(symbols: Mapping[str, ca.SX], name: str, x: ca.SX, v: ca.
     return ca.vertcat(A[0] * x[0] + A[1] * x[1] + b[0] * v, A[2] * x[0] + A[3] * x[1] + b[1] * v)
 
 
-def _equilibrium(parameters: Layout, symbols: Mapping[str, ca.SX], p: ca.SX) -> ca.Function:
+def _equilibrium(layout: Layout, symbols: Mapping[str, ca.SX], p: ca.SX) -> ca.Function:
     """At rest y = u_c = F: the filters have settled on F and the command is zero."""
     force = ca.SX.sym("force")
     settled = ca.vertcat(
         force / symbols["ao"], 0, force / (symbols["ao"] * symbols["bandwidth"] ** 2)
     )
-    state = _STATE.join(
-        {
-            "filtered_command": ca.SX.zeros(3),
-            "filtered_force": settled,
-            "filtered_reference": settled,
-            "gains": symbols["initial_gains"],
-            "model": ca.vertcat(0, force),
-            "prefilter": ca.vertcat(0, (1 - symbols["direct"]) * force),
-        }
-    )
+    resting = {
+        "filtered_command": ca.SX.zeros(3),
+        "filtered_force": settled,
+        "filtered_reference": settled,
+        "gains": symbols["initial_gains"],
+        "model": ca.vertcat(0, force),
+        "prefilter": ca.vertcat(0, (1 - symbols["direct"]) * force),
+    }
+    if "oscillator_start" in symbols:
+        harmonics = dict(layout.blocks)["harmonic_gains"]
+        resting["harmonic_gains"] = ca.SX.zeros(harmonics)
+        resting["oscillator"] = ca.vertcat(0, symbols["oscillator_start"])
+    state = layout.join(resting)
     return ca.Function("equilibrium", [force, p], [state], ["force", "parameters"], ["state"])

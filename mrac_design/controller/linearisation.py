@@ -94,10 +94,10 @@ def _torque_function(dynamics: RobotDynamics, layout: Layout) -> ca.Function:
     J = dynamics.task_jacobian(q)
     velocity = J @ qd
     stiffness, damping = symbols["tool_axis_gains"][0], symbols["tool_axis_gains"][1]
-    tool_axis = dynamics.task_position(q)[k:]
+    tool_axis = dynamics.task_position(q)[k:, :]
     acceleration = ca.vertcat(
         command - symbols["velocity_gain"] * velocity[:k],
-        stiffness * (symbols["tool_axis_target"] - tool_axis) - damping * velocity[k:],
+        stiffness * (symbols["tool_axis_target"] - tool_axis) - damping * velocity[k:, :],
     )
     qdd = dynamics.joint_acceleration(q, qd, acceleration)
     free = dynamics.inverse_dynamics(q, qd, qdd, symbols["inertia"])

@@ -91,22 +91,8 @@ def model_description(
         generationTool=f"mrac_design {version}",
         variableNamingConvention="structured",
     )
-    slave = ElementTree.SubElement(
-        root,
-        "CoSimulation",
-        modelIdentifier=MODEL_IDENTIFIER,
-        canHandleVariableCommunicationStepSize="true",
-        canNotUseMemoryManagementFunctions="true",
-        canGetAndSetFMUstate="true",
-        canSerializeFMUstate="true",
-    )
-    files = ElementTree.SubElement(slave, "SourceFiles")
-    ElementTree.SubElement(files, "File", name=source)
-    units = ElementTree.SubElement(root, "UnitDefinitions")
-    for name in sorted({variable.unit for variable in variables if variable.unit}):
-        unit = ElementTree.SubElement(units, "Unit", name=name)
-        powers = {base: str(power) for base, power in _BASE_UNITS[name].items()}
-        ElementTree.SubElement(unit, "BaseUnit", powers)
+    _add_co_simulation(root, source)
+    _add_units(root, variables)
     categories = ElementTree.SubElement(root, "LogCategories")
     ElementTree.SubElement(categories, "Category", name="logStatusError")
     period = repr(step.time_domain.period)
@@ -123,6 +109,28 @@ def model_description(
     ElementTree.indent(root)
     text = ElementTree.tostring(root, encoding="unicode")
     return f'<?xml version="1.0" encoding="UTF-8"?>\n{text}\n'
+
+
+def _add_co_simulation(root: ElementTree.Element, source: str) -> None:
+    slave = ElementTree.SubElement(
+        root,
+        "CoSimulation",
+        modelIdentifier=MODEL_IDENTIFIER,
+        canHandleVariableCommunicationStepSize="true",
+        canNotUseMemoryManagementFunctions="true",
+        canGetAndSetFMUstate="true",
+        canSerializeFMUstate="true",
+    )
+    files = ElementTree.SubElement(slave, "SourceFiles")
+    ElementTree.SubElement(files, "File", name=source)
+
+
+def _add_units(root: ElementTree.Element, variables: tuple[FmuVariable, ...]) -> None:
+    units = ElementTree.SubElement(root, "UnitDefinitions")
+    for name in sorted({variable.unit for variable in variables if variable.unit}):
+        unit = ElementTree.SubElement(units, "Unit", name=name)
+        powers = {base: str(power) for base, power in _BASE_UNITS[name].items()}
+        ElementTree.SubElement(unit, "BaseUnit", powers)
 
 
 def _add_variable(parent: ElementTree.Element, reference: int, variable: FmuVariable) -> None:

@@ -11,7 +11,7 @@ from __future__ import annotations
 
 import hashlib
 import math
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field, fields, replace
 from importlib.metadata import version
 from pathlib import Path
 
@@ -19,7 +19,7 @@ import numpy as np
 
 from mrac_design.arrays import readonly
 from mrac_design.controller.adaptation import AdaptationLaw
-from mrac_design.controller.adaptive import AdaptiveRST, build_step
+from mrac_design.controller.adaptive import GAIN_NAMES, AdaptiveRST, build_step
 from mrac_design.controller.linearisation import RobotModelError, build_linearisation
 from mrac_design.controller.reference import DirectReference, ModelInverse
 from mrac_design.controller.robot_step import RobotStep, build_robot_step
@@ -30,7 +30,7 @@ from mrac_design.resources import models_directory
 from mrac_design.robot import available_robots, build_dynamics, load_robot
 from mrac_design.simulation.scenario import Scenario
 from mrac_design.study import VARIANTS, Variant, variant_controller
-from mrac_design.time_domain import Discrete, TimeDomain
+from mrac_design.time_domain import Continuous, Discrete, TimeDomain
 
 COEFFICIENT_NAMES = ("r1", "s0", "s1", "t0", "t1")
 """Entries of `GainSet.coefficients`, in order."""
@@ -90,6 +90,8 @@ class GainSet:
         if not 0 < self.tool_axis_bandwidth < math.inf:
             raise ParameterError("tool_axis_bandwidth", self.tool_axis_bandwidth, "must be > 0")
         object.__setattr__(self, "design", _design(self.specification, self.coefficients))
+        controller_of(self, Continuous())  # refuses what no controller can have
+        self.law.parameters(len(GAIN_NAMES))
 
     def _repr_markdown_(self) -> str:
         return self.design._repr_markdown_()
@@ -98,12 +100,13 @@ class GainSet:
 def gain_set(scenario: Scenario, design: RSTDesign, variant: Variant = VARIANTS[-1]) -> GainSet:
     """The gains of one of a study's controllers, by default the adaptive one with model inverse.
 
-    Raises ModelFileError when the scenario's robot file cannot be read.
+    Raises ModelFileError when the scenario's robot file cannot be read, ParameterError when the
+    controller holds something that a gain set does not.
     """
     controller = variant_controller(scenario, design, variant)
     feedforward = controller.feedforward
     assert isinstance(feedforward, DirectReference | ModelInverse)
-    return GainSet(
+    gains = GainSet(
         scenario=scenario.name,
         package_version=version("mrac-design"),
         robot=robot_fingerprint(scenario.robot),
@@ -117,6 +120,8 @@ def gain_set(scenario: Scenario, design: RSTDesign, variant: Variant = VARIANTS[
         tool_axis_bandwidth=scenario.design.tool_axis_bandwidth,
         robot_model=scenario.model_error,
     )
+    _require_complete(gains, controller)
+    return gains
 
 
 def controller_of(gains: GainSet, time_domain: TimeDomain) -> AdaptiveRST:
@@ -173,6 +178,15 @@ def robot_fingerprint(robot: str) -> RobotFingerprint:
     except OSError as problem:
         raise ModelFileError(path, "", f"cannot be read: {problem.strerror}") from problem
     return RobotFingerprint(file=path.name, sha256=hashlib.sha256(content).hexdigest())
+
+
+def _require_complete(gains: GainSet, controller: AdaptiveRST) -> None:
+    """Nothing of a controller may get lost on its way into a gain set."""
+    back = controller_of(gains, controller.time_domain)
+    for entry in fields(controller):
+        kept, own = getattr(back, entry.name), getattr(controller, entry.name)
+        if entry.name != "design" and kept != own:
+            raise ParameterError(entry.name.replace("_", " "), own, "has no place in a gain set")
 
 
 def _design(specification: RSTSpecification, coefficients: tuple[float, ...]) -> RSTDesign:

@@ -1,13 +1,13 @@
 """The robot on the heart under force control, as one hybrid system.
 
-reference ─► axis controllers ─u─► linearisation ─Γ─► robot ─X─► spring ─Fe─┐
+reference ─► axis controllers ─u─► linearisation ─Γ─► robot ─X─► tissue ─Fe─┐
                    ▲                    ▲                          ▲        │
                    └────────────────────┴───── Fe ─────────────── X − Xh ◄──┘
 """
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 import casadi as ca
@@ -18,14 +18,10 @@ from mrac_design.arrays import FloatArray, readonly
 from mrac_design.controller.linearisation import Linearisation
 from mrac_design.controller.robot_step import saturated
 from mrac_design.controller.step import ControllerStep
-from mrac_design.errors import ParameterError
 from mrac_design.layout import Layout
-from mrac_design.robot import (
-    RobotDescription,
-    RobotDynamics,
-    check_posture,
-    inertial_parameters,
-)
+from mrac_design.robot import RobotDynamics, check_posture, inertial_parameters
+from mrac_design.simulation.contact import Contact, Touch
+from mrac_design.simulation.friction import Friction
 from mrac_design.simulation.system import ARGUMENT_NAMES, HybridSystem
 
 
@@ -48,18 +44,21 @@ def build_force_loop(
     linearisation: Linearisation,
     controllers: Sequence[ControllerStep],
     *,
-    stiffness: ArrayLike,
+    contact: Contact,
+    friction: Friction,
 ) -> ForceLoop:
-    """Close the loop over a two-sided spring of true `stiffness` Ks (N/m, one or one per axis).
+    """Close the loop over the true `contact` with the true `friction` of the joints.
 
-    Efforts are limited to the robot's own limits. Raises ParameterError for a bad stiffness.
+    Efforts are limited to the robot's own limits. Raises ParameterError for a contact made for
+    another number of axes.
     """
     robot = dynamics.description
     axes, n = robot.force_axes, robot.joint_count
     values = {
         "inertia": inertial_parameters(robot),
         "effort_limit": robot.effort_limits,
-        "stiffness": contact_stiffness(robot, stiffness),
+        **contact.values(len(axes)),
+        **friction.values(robot),
         "linearisation": linearisation.parameter_values,
         **{f"controller_{a}": c.parameter_values for a, c in zip(axes, controllers, strict=True)},
     }
@@ -71,8 +70,11 @@ def build_force_loop(
             *((f"controller_{a}", c.state.size) for a, c in zip(axes, controllers, strict=True)),
         )
     )
-    inputs = Layout((("heart", len(axes)), ("reference", len(axes))))
-    system = _system(dynamics, linearisation, controllers, state, inputs, parameters)
+    inputs = Layout(
+        (("heart", len(axes)), ("reference", len(axes)), *contact.inputs(len(axes)).blocks)
+    )
+    plant = Plant(dynamics=dynamics, contact=contact, friction=friction)
+    system = _system(plant, linearisation, controllers, state, inputs, parameters)
     return ForceLoop(
         system=system,
         parameter_values=parameters.pack(values),
@@ -81,24 +83,64 @@ def build_force_loop(
     )
 
 
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class Plant:
+    """What a controller acts on: the true robot, its joints' friction and the tissue."""
+
+    dynamics: RobotDynamics
+    """The true robot."""
+    contact: Contact
+    """What the tissue does."""
+    friction: Friction
+    """What the joints lose."""
+
+    def contact_force(
+        self,
+        states: Mapping[str, ca.SX],
+        exogenous: Mapping[str, ca.SX],
+        symbols: Mapping[str, ca.SX],
+    ) -> tuple[ca.SX, ca.SX]:
+        """Tip position (m) and contact force (N), (k,) each."""
+        axes = len(self.dynamics.description.force_axes)
+        q, qd = states["joint_position"], states["joint_velocity"]
+        tip = self.dynamics.task_position(q)[:axes]
+        touch = Touch(
+            depth=tip - exogenous["heart"],
+            velocity=self.dynamics.task_jacobian(q)[:axes, :] @ qd,
+            inputs=exogenous,
+            parameters=symbols,
+        )
+        return tip, self.contact.force(touch)
+
+    def acceleration(
+        self,
+        states: Mapping[str, ca.SX],
+        effort: ca.SX,
+        force: ca.SX,
+        symbols: Mapping[str, ca.SX],
+    ) -> ca.SX:
+        """Joint accelerations (n,) under joint efforts and the contact force (N) on the tip."""
+        q, qd = states["joint_position"], states["joint_velocity"]
+        left = self.friction.remaining(effort, qd, symbols)
+        return contact_acceleration(self.dynamics, q, qd, left, force, symbols["inertia"])
+
+
 def _system(
-    dynamics: RobotDynamics,
+    plant: Plant,
     linearisation: Linearisation,
     controllers: Sequence[ControllerStep],
     state: Layout,
     inputs: Layout,
     parameters: Layout,
 ) -> HybridSystem:
-    axes = dynamics.description.force_axes
-    k = len(axes)
+    axes = plant.dynamics.description.force_axes
     held = Layout(())
     x, z = state.symbols("state"), held.symbols("held")
     v, p = inputs.symbols("input"), parameters.symbols("parameters")
     states, exogenous, symbols = state.split(x), inputs.split(v), parameters.split(p)
     q, qd = states["joint_position"], states["joint_velocity"]
 
-    tip = dynamics.task_position(q)[:k]
-    force = symbols["stiffness"] * (tip - exogenous["heart"])
+    tip, force = plant.contact_force(states, exogenous, symbols)
     commands, following, signals = [], [], []
     for i, (axis, step) in enumerate(zip(axes, controllers, strict=True)):
         own, reference = states[f"controller_{axis}"], exogenous["reference"][i]
@@ -111,7 +153,7 @@ def _system(
     command = ca.vertcat(*commands)
     wanted = linearisation.torque(q, qd, force, command, symbols["linearisation"])
     effort = saturated(wanted, symbols["effort_limit"])
-    qdd = contact_acceleration(dynamics, q, qd, effort, force, symbols["inertia"])
+    qdd = plant.acceleration(states, effort, force, symbols)
     rate = ca.vertcat(qd, qdd, *following)
 
     recorded = {
@@ -138,17 +180,6 @@ def _system(
             "output", arguments, [outputs.join(recorded)], list(ARGUMENT_NAMES), ["output"]
         ),
     )
-
-
-def contact_stiffness(robot: RobotDescription, stiffness: ArrayLike) -> FloatArray:
-    """True spring stiffness of each force axis (N/m, one given or one per axis), shape (k,).
-
-    Raises ParameterError unless all are finite and positive.
-    """
-    springs = np.broadcast_to(np.asarray(stiffness, dtype=float), (len(robot.force_axes),))
-    if not np.all((springs > 0) & np.isfinite(springs)):
-        raise ParameterError("stiffness", springs, "must be finite and > 0 N/m")
-    return readonly(springs)
 
 
 def contact_acceleration(

@@ -54,7 +54,7 @@ class DaskCluster:
 
             ahead = 4 * max(1, sum(client.nthreads().values()))
             pending = as_completed(
-                [submit(number) for number in islice(waiting, ahead)]
+                [submit(number) for number in islice(waiting, ahead)], loop=client.loop
             )
             try:
                 for future in pending:

@@ -1,9 +1,9 @@
 r"""What the tissue does to the tool: contact laws, axis by axis, composed by wrapping.
 
-    depth δ = X − Xh,  rate δ̇ = Ẋ − Ẋh        LinearSpring      Fe = Ks δ                 [Z]
-                                              WithDamper        Fe = … + c δ̇              (Kelvin–Voigt)
-                                              ScheduledTissue   Fe = s(t) × …
-                                              OneSided          Fe = max(0, …) while δ > 0, else 0
+    depth δ = X − Xh (m)      LinearSpring       Fe = Ks δ                         [Z]
+                              WithDamper         Fe = … + c δ̇ (Kelvin–Voigt)
+                              ScheduledTissue    Fe = s(t) × …
+                              OneSided           Fe = max(0, …) where δ > 0, else 0
 
 Whatever a law needs beyond the heart's position it asks for as inputs of the loop, so a run stays
 a function of its inputs and a plain spring costs nothing more than a product.

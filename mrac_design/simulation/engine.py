@@ -103,9 +103,7 @@ class CompiledEngine(NativeEngine):
         self, system: HybridSystem, method: Method, *, input_powers: int, compiler: str
     ) -> None:
         library = compile_library(c_program(system, method, input_powers=input_powers), compiler)
-        super().__init__(
-            run_entry(library.run), outputs=system.outputs.size, powers=input_powers
-        )
+        super().__init__(run_entry(library.run), outputs=system.outputs.size, powers=input_powers)
 
 
 class LlvmEngine(NativeEngine):

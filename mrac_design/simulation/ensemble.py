@@ -22,11 +22,14 @@ from typing import Protocol
 import numpy as np
 
 from mrac_design.arrays import FloatArray, readonly
+from mrac_design.codegen.c_source import c_routine
+from mrac_design.codegen.reading import read_function
 from mrac_design.errors import CompilationError, ParameterError
 from mrac_design.simulation.compilation import find_compiler
 from mrac_design.simulation.engine import build_engine
 from mrac_design.simulation.lanes import LANES, Case, GroupEngine, LaneEngine, RecordingEngine
 from mrac_design.simulation.method import Method
+from mrac_design.simulation.program import c_program
 from mrac_design.simulation.reduction import Reduction
 from mrac_design.simulation.run import Progress, RunSettings
 from mrac_design.simulation.schedule import build_schedule
@@ -75,7 +78,17 @@ class Ensemble:
 
     def fingerprint(self) -> str:
         """A hash of everything the table depends on."""
-        return hashlib.sha256(pickle.dumps(self, protocol=5)).hexdigest()
+        program = c_program(
+            self.system,
+            self.method,
+            input_powers=self.input_powers,
+            reduction=self.reduction.over(self.system),
+        )
+        finish = c_routine(read_function(self.reduction.finish), "finish")
+        drawn = (self.sampler, self.settings, self.runs, self.seed, self.chunk)
+        rest = (self.reduction.initial.tobytes(), self.reduction.metrics, *drawn)
+        text = f"{program}\n{finish}".encode()
+        return hashlib.sha256(text + pickle.dumps(rest, protocol=5)).hexdigest()
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)

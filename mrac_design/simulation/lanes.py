@@ -8,6 +8,7 @@ from typing import Protocol
 
 import casadi as ca
 import numpy as np
+from numpy.typing import NDArray
 
 from mrac_design.arrays import FloatArray, readonly
 from mrac_design.motion.signal import PiecewisePolynomial
@@ -33,10 +34,18 @@ class Case:
     """State at time 0, shape (state.size,)."""
     inputs: PiecewisePolynomial
     """Inputs over the run; cases with the same breakpoints can share vectors."""
+    held: FloatArray | None = None
+    """Memory before the first update, shape (held.size,); None is zero."""
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "parameters", readonly(self.parameters, (-1,)))
         object.__setattr__(self, "initial_state", readonly(self.initial_state, (-1,)))
+        if self.held is not None:
+            object.__setattr__(self, "held", readonly(self.held, (-1,)))
+
+    def memory(self, size: int) -> FloatArray:
+        """A copy of the initial memory, shape (size,)."""
+        return np.zeros(size) if self.held is None else np.array(self.held)
 
 
 class GroupEngine(Protocol):
@@ -82,11 +91,9 @@ class LaneEngine:
         state = _interleaved([case.initial_state for case in filled])
         parameters = _interleaved([case.parameters for case in filled])
         coefficients = _interleaved([_by_segment(case.inputs, self._powers) for case in filled])
-        held = _aligned((self._system.held.size, self._lanes))
+        held = _interleaved([case.memory(self._system.held.size) for case in filled])
         sums = _interleaved([self._reduction.initial] * self._lanes)
-        run_part(
-            self._run, schedule, slice(None), coefficients, parameters, state, held, sums
-        )
+        run_part(self._run, schedule, slice(None), coefficients, parameters, state, held, sums)
         return _judged(sums.T[:count], state.T[:count])
 
 
@@ -107,7 +114,7 @@ class RecordingEngine:
         fold = self._reduction.fold.mapaccum("folds", times.size, {"base": 8})
         rows = []
         for case in cases:
-            state, held = np.array(case.initial_state), np.zeros(self._system.held.size)
+            state, held = np.array(case.initial_state), case.memory(self._system.held.size)
             coefficients = np.ascontiguousarray(_by_segment(case.inputs, self._powers))
             outputs = self._engine.run(
                 schedule, slice(None), coefficients, case.parameters, state, held
@@ -147,5 +154,5 @@ def _aligned(shape: tuple[int, ...]) -> FloatArray:
 
 def _judged(sums: FloatArray, states: FloatArray) -> FloatArray:
     """Copies with NaN in the rows of runs whose state is no longer finite."""
-    finite = np.isfinite(states).all(axis=1)
+    finite: NDArray[np.bool_] = np.logical_and.reduce(np.isfinite(states), axis=1)
     return np.where(finite[:, None], sums, np.nan)

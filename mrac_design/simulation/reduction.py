@@ -17,8 +17,8 @@ from mrac_design.simulation.system import ARGUMENT_NAMES, HybridSystem
 class Reduction:
     """A fold over the recording instants, and what it comes to in the end.
 
-        a⁺ = fold(a, output, time)      at every recording instant
-        metrics = finish(a)             at the end
+    a⁺ = fold(a, output, time)      at every recording instant
+    metrics = finish(a)             at the end
     """
 
     initial: FloatArray

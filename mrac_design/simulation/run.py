@@ -7,6 +7,7 @@ from dataclasses import dataclass
 from itertools import pairwise
 
 import numpy as np
+from numpy.typing import NDArray
 
 from mrac_design.arrays import FloatArray, readonly
 from mrac_design.errors import SimulationError
@@ -88,7 +89,7 @@ def run(
 
 
 def _require_finite(rows: list[FloatArray], time: FloatArray, state: FloatArray) -> None:
-    finite = np.isfinite(rows[-1]).all(axis=1)
+    finite: NDArray[np.bool_] = np.logical_and.reduce(np.isfinite(rows[-1]), axis=1)
     if finite.all() and np.isfinite(state).all():
         return
     done = sum(len(part) for part in rows[:-1])

@@ -1,8 +1,8 @@
 """The robot on the heart under a sampled controller, as one hybrid system.
 
     at sampling instants   Fe + noise ─► sensor ─► robot step ─► pipeline of d samples ─┐
-                           q, q̇ ──────────────────────▲                                 │ hold
-    in between             robot and spring, continuous  ◄──────────────── Γ ───────────┘
+                           q, q̇ ─► joint sensors ─────▲                                 │ hold
+    in between             robot and tissue, continuous  ◄─────────── drive limits ◄─ Γ ┘
 
 The controller is the very `RobotStep` that is exported; only the plant is integrated.
 """
@@ -17,18 +17,17 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from mrac_design.arrays import FloatArray, readonly
-from mrac_design.controller.robot_step import RobotStep
+from mrac_design.controller.robot_step import RobotStep, saturated
 from mrac_design.errors import ParameterError
 from mrac_design.layout import Layout
 from mrac_design.robot import RobotDynamics, check_posture, inertial_parameters
-from mrac_design.simulation.closed_loop import (
-    ForceLoop,
-    contact_acceleration,
-    contact_stiffness,
-)
+from mrac_design.simulation.closed_loop import ForceLoop, Plant
+from mrac_design.simulation.contact import Contact
+from mrac_design.simulation.encoder import JointSensor
+from mrac_design.simulation.friction import Friction
 from mrac_design.simulation.readout import force_loop_trajectory
 from mrac_design.simulation.run import Recording
-from mrac_design.simulation.sensor import ForceSensor
+from mrac_design.simulation.sensor import ForceSensing
 from mrac_design.simulation.system import ARGUMENT_NAMES, HybridSystem
 from mrac_design.simulation.trajectory import Signal, Trajectory
 
@@ -51,23 +50,30 @@ class SampledForceLoop:
 
     loop: ForceLoop
     """The equations; inputs are heart position (m), force reference (N) and sensor noise (N),
-    k of each."""
+    k of each, and what the contact asks for."""
     step: RobotStep
     """The controller inside."""
+    sensor: ForceSensing
+    """What it measures the force with."""
+    joints: JointSensor
+    """What it measures the joints with."""
 
 
 def build_sampled_loop(
     dynamics: RobotDynamics,
     step: RobotStep,
     *,
-    stiffness: ArrayLike,
+    contact: Contact,
+    friction: Friction,
     delay: ComputationalDelay,
-    sensor: ForceSensor,
+    sensor: ForceSensing,
+    joints: JointSensor,
 ) -> SampledForceLoop:
-    """Close the loop of the true robot `dynamics` over a two-sided spring of `stiffness` (N/m).
+    """Close the loop of the true robot `dynamics` over the true `contact` and `friction`.
 
-    The torque is held between samples (zero-order hold). Raises ParameterError for a bad
-    stiffness or a controller made for other axes or joints than the robot's.
+    The torque is held between samples (zero-order hold) and limited by the drives themselves.
+    Raises ParameterError for a contact made for another number of axes, or a controller made for
+    other axes or joints than the robot's.
     """
     robot = dynamics.description
     axes, n = len(robot.force_axes), robot.joint_count
@@ -77,9 +83,12 @@ def build_sampled_loop(
         )
     values: dict[str, ArrayLike] = {
         "inertia": inertial_parameters(robot),
-        "stiffness": contact_stiffness(robot, stiffness),
+        **contact.values(axes),
+        **friction.values(robot),
+        "drive_limit": robot.effort_limits,
         "controller": step.parameter_values,
         **sensor.parameters(),
+        **joints.values(robot, step.time_domain.period),
     }
     parameters = Layout(tuple((name, int(np.size(value))) for name, value in values.items()))
     held = Layout(
@@ -87,31 +96,36 @@ def build_sampled_loop(
             ("controller", step.state.size),
             ("pipeline", n * (delay.samples + 1)),
             *sensor.memory(axes).blocks,
+            *joints.memory(n).blocks,
             *step.signals.blocks,
         )
     )
-    state = Layout((("joint_position", n), ("joint_velocity", n)))
-    inputs = Layout((("heart", axes), ("reference", axes), ("noise", axes)))
-    system = _system(dynamics, step, sensor, state, held, inputs, parameters)
+    state = Layout((("joint_position", n), ("joint_velocity", n), *sensor.state(axes).blocks))
+    inputs = Layout(
+        (("heart", axes), ("reference", axes), ("noise", axes), *contact.inputs(axes).blocks)
+    )
+    plant = Plant(dynamics=dynamics, contact=contact, friction=friction)
+    system = _system(plant, step, (sensor, joints), state, held, inputs, parameters)
     loop = ForceLoop(
         system=system,
         parameter_values=parameters.pack(values),
         dynamics=dynamics,
         controllers=step.controllers,
     )
-    return SampledForceLoop(loop=loop, step=step)
+    return SampledForceLoop(loop=loop, step=step, sensor=sensor, joints=joints)
 
 
 def _system(
-    dynamics: RobotDynamics,
+    plant: Plant,
     step: RobotStep,
-    sensor: ForceSensor,
+    sensors: tuple[ForceSensing, JointSensor],
     state: Layout,
     held: Layout,
     inputs: Layout,
     parameters: Layout,
 ) -> HybridSystem:
-    n, axes = dynamics.description.joint_count, len(dynamics.description.force_axes)
+    n = plant.dynamics.description.joint_count
+    sensor, joints = sensors
     arguments = [
         state.symbols("state"),
         held.symbols("held"),
@@ -123,21 +137,25 @@ def _system(
         layout.split(vector) for layout, vector in zip(layouts, arguments, strict=True)
     )
     q, qd = states["joint_position"], states["joint_velocity"]
-    tip = dynamics.task_position(q)[:axes]
-    force = symbols["stiffness"] * (tip - exogenous["heart"])
-    reading = sensor.sample(memory, force, exogenous["noise"], symbols)
+    tip, force = plant.contact_force(states, exogenous, symbols)
+    reading = sensor.sample(memory, force, exogenous["noise"], symbols, states)
+    seen = joints.read(memory, q, qd, symbols)
     following, torque, signals = step.step(
         memory["controller"],
-        q,
-        qd,
+        seen.position,
+        seen.velocity,
         reading["measured_force"],
         exogenous["reference"],
         symbols["controller"],
     )
     # The newest torque enters at the front; the one that acts leaves at the back.
     pipeline = ca.vertcat(torque, memory["pipeline"])[: memory["pipeline"].numel()]
-    effort = memory["pipeline"][-n:]
-    qdd = contact_acceleration(dynamics, q, qd, effort, force, symbols["inertia"])
+    effort = saturated(memory["pipeline"][-n:], symbols["drive_limit"])
+    moving = {
+        "joint_position": qd,
+        "joint_velocity": plant.acceleration(states, effort, force, symbols),
+        **sensor.rate(states, force, symbols),
+    }
     recorded = {
         "force": force,
         "measured_force": memory["measured_force"],
@@ -154,6 +172,7 @@ def _system(
         "controller": following,
         "pipeline": pipeline,
         **reading,
+        **seen.memory,
         **step.signals.split(signals),
     }
 
@@ -167,7 +186,7 @@ def _system(
         inputs=inputs,
         parameters=parameters,
         outputs=outputs,
-        rate=function("rate", ca.vertcat(qd, qdd), "rate"),
+        rate=function("rate", state.join(moving), "rate"),
         output=function("output", outputs.join(recorded), "output"),
         update=function("update", held.join(update), "next_held"),
         sampling_period=step.time_domain.period,
@@ -206,8 +225,11 @@ def resting_start(
         **{name: 0.0 for name, _ in layout.blocks},
         "controller": settled,
         "pipeline": np.tile(torque.full().ravel(), (queue.stop - queue.start) // n),
+        **sampled.joints.resting(joints, loop.dynamics.description),
     }
-    state = loop.system.state.pack({"joint_position": posture, "joint_velocity": still})
+    state = loop.system.state.pack(
+        {"joint_position": posture, "joint_velocity": still, **sampled.sensor.resting(level)}
+    )
     return SampledStart(state=readonly(state), held=layout.pack(memory))
 
 

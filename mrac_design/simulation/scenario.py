@@ -5,9 +5,8 @@ from __future__ import annotations
 import os
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
-from functools import partial
 from pathlib import Path
-from typing import TypeVar
+from typing import Any, TypeVar
 
 import tomli_w
 
@@ -15,8 +14,24 @@ from mrac_design.controller.adaptation import AdaptationLaw, GradientLaw, Normal
 from mrac_design.controller.linearisation import RobotModelError
 from mrac_design.design import ReferenceModel
 from mrac_design.errors import ParameterError, ScenarioFileError
-from mrac_design.motion import ForceReference, StepSequence
+from mrac_design.motion import ForceReference
 from mrac_design.resources import models_directory
+from mrac_design.simulation.plant_choices import (
+    CONTACT_KEYS,
+    ContactChoice,
+    FrictionChoice,
+    contact_entries,
+    read_contact,
+    read_steps,
+    step_entries,
+)
+from mrac_design.simulation.safeguards import (
+    Safeguard,
+    read_safeguards,
+    safeguard_entries,
+    wrapped,
+)
+from mrac_design.simulation.sampling_choices import Sampling, read_sampling, sampling_entries
 from mrac_design.strict_toml import Table, read_table
 
 _Section = TypeVar("_Section")
@@ -66,10 +81,15 @@ class AdaptationChoice:
     """α of the normalised law (N²)."""
     bias_force: float
     """Size of the constant regressor (N); 0 leaves it out."""
+    safeguards: tuple[Safeguard, ...]
+    """Wrappers of the law, the first one innermost."""
 
-    def build(self, gain: float) -> AdaptationLaw:
-        """The law with `gain` in place of its own (0 for the frozen controller)."""
-        return LAWS[self.law](gain, self.normalisation)
+    def build(self, gain: float, *, nominal: tuple[float, ...]) -> AdaptationLaw:
+        """The law inside its safeguards, with `gain` in place of its own (0 when frozen).
+
+        `nominal` are the design's scaled gains, 5 values, which safeguards refer to.
+        """
+        return wrapped(LAWS[self.law](gain, self.normalisation), self.safeguards, nominal)
 
 
 LAWS: Mapping[str, Callable[[float, float], AdaptationLaw]] = {
@@ -119,6 +139,12 @@ class Scenario:
     """Heart motion."""
     stiffness: float
     """True Ks of the tissue (N/m)."""
+    contact: ContactChoice
+    """What the tissue does beside being a spring."""
+    friction: FrictionChoice
+    """Friction of the true robot's joints."""
+    sampling: Sampling
+    """The controller's time domain, and how it measures when it is sampled."""
     design: DesignChoice
     """Controller design."""
     prefilter: ReferenceModel
@@ -158,11 +184,11 @@ def load_scenario(name_or_path: str | Path) -> Scenario:
         )
     root = read_table(path, ScenarioFileError)
     root.only(
-        "name", "title", "robot", "motion", "contact", "design", "prefilter", "adaptation",
-        "model_error", "reference", "simulation",
+        "name", "title", "robot", "motion", "contact", "friction", "sampling", "design",
+        "prefilter", "adaptation", "model_error", "reference", "simulation",
     )  # fmt: skip
     contact = root.table("contact")
-    contact.only("stiffness")
+    contact.only(*CONTACT_KEYS)
     return root.build(
         lambda: Scenario(
             name=root.text("name"),
@@ -170,6 +196,9 @@ def load_scenario(name_or_path: str | Path) -> Scenario:
             robot=_beside(path, root.text("robot")),
             motion=_motion(root.table("motion")),
             stiffness=contact.number("stiffness"),
+            contact=read_contact(contact),
+            friction=_section(root.table("friction"), FrictionChoice),
+            sampling=read_sampling(root.table("sampling")),
             design=_section(root.table("design"), DesignChoice),
             prefilter=_section(root.table("prefilter"), ReferenceModel),
             adaptation=_adaptation(root.table("adaptation")),
@@ -190,13 +219,18 @@ def save_scenario(scenario: Scenario, path: Path) -> None:
         "title": scenario.title,
         "robot": scenario.robot,
         "motion": _entries(scenario.motion),
-        "contact": {"stiffness": scenario.stiffness},
+        "contact": contact_entries(scenario.stiffness, scenario.contact),
+        "friction": _entries(scenario.friction),
+        "sampling": sampling_entries(scenario.sampling),
         "design": _entries(scenario.design),
         "prefilter": _entries(scenario.prefilter),
-        "adaptation": _entries(scenario.adaptation),
+        "adaptation": {
+            **_entries(scenario.adaptation),
+            "safeguards": safeguard_entries(scenario.adaptation.safeguards),
+        },
         "model_error": _entries(scenario.model_error),
         "reference": {
-            axis: {"times": list(steps.times), "levels": list(steps.levels)}
+            axis: step_entries(steps)
             for axis, steps in zip("XYZ", scenario.reference.steps, strict=False)
         },
         "simulation": _entries(scenario.simulation),
@@ -206,7 +240,7 @@ def save_scenario(scenario: Scenario, path: Path) -> None:
     os.replace(temporary, path)
 
 
-def _entries(section: object) -> dict[str, float | str]:
+def _entries(section: object) -> dict[str, Any]:
     return {name: getattr(section, name) for name in section.__dataclass_fields__}  # type: ignore[attr-defined]
 
 
@@ -227,28 +261,23 @@ def _motion(table: Table) -> MotionChoice:
 
 
 def _adaptation(table: Table) -> AdaptationChoice:
-    table.only("law", "gain", "normalisation", "bias_force")
+    table.only("law", "gain", "normalisation", "bias_force", "safeguards")
     table.choice("law", LAWS)
     choice = AdaptationChoice(
         law=table.text("law"),
         gain=table.number("gain"),
         normalisation=table.number("normalisation"),
         bias_force=table.number("bias_force"),
+        safeguards=read_safeguards(table),
     )
-    table.build(lambda: choice.build(choice.gain))
+    table.build(lambda: choice.build(choice.gain, nominal=(1.0,) * 5))
     return choice
 
 
 def _reference(table: Table) -> ForceReference:
     axes = [axis for axis in "XYZ" if axis in table.entries]
     table.only(*(axes or "XYZ"))
-    steps = []
-    for axis in axes:
-        own = table.table(axis)
-        own.only("times", "levels")
-        times, levels = own.numbers("times"), own.numbers("levels")
-        steps.append(own.build(partial(StepSequence, times=tuple(times), levels=tuple(levels))))
-    return ForceReference(steps=tuple(steps))
+    return ForceReference(steps=tuple(read_steps(table.table(axis)) for axis in axes))
 
 
 def _beside(scenario_file: Path, name_or_path: str) -> str:

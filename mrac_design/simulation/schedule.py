@@ -75,7 +75,8 @@ def build_schedule(
 
 
 def _multiples(period: float, end: float) -> FloatArray:
-    return np.arange(np.ceil(end / period - 1e-9)) * period
+    count = int(np.ceil(end / period - 1e-9))
+    return period * np.arange(count, dtype=np.float64)
 
 
 def _among(instants: FloatArray, chosen: FloatArray, tolerance: float) -> NDArray[np.bool_]:

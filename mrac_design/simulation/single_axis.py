@@ -40,6 +40,9 @@ _TEXTS = {
     "command": ("m/s²", "acceleration applied, after its limit and delay"),
     "augmented_error": ("N", "augmented error"),
     "adapted_gains": ("1", "adapted gains, scaled to order one"),
+    "heart_rate": ("rad/s", "tracked frequency of the periodic motion"),
+    "beat_force": ("N", "estimated part of the beat in the force"),
+    "learned_command": ("m/s²", "command learned over the last periods"),
     "disturbance_estimate": ("m/s²", "estimated disturbance, as an equivalent command"),
 }
 

@@ -19,7 +19,10 @@ from mrac_design.export.c_selftest import build_self_test as self_test_of
 from mrac_design.export.c_selftest import evaluate_in
 from mrac_design.motion.signal import PiecewisePolynomial, quintic_hermite, stack
 from mrac_design.robot import inertial_parameters
+from mrac_design.simulation.contact import LinearSpring
+from mrac_design.simulation.encoder import ExactJoints
 from mrac_design.simulation.engine import build_engine
+from mrac_design.simulation.friction import Frictionless
 from mrac_design.simulation.run import RunSettings, run
 from mrac_design.simulation.sampled_loop import (
     ComputationalDelay,
@@ -77,9 +80,11 @@ class SimulatedRun:
         sampled = build_sampled_loop(
             dynamics,
             step,
-            stiffness=STIFFNESS,
+            contact=LinearSpring(STIFFNESS),
+            friction=Frictionless(),
             delay=ComputationalDelay(1),
             sensor=ForceSensor(decimation=2, quantiser=UniformQuantiser(resolution=5e-3)),
+            joints=ExactJoints(),
         )
         loop = sampled.loop
         self.parameters = step.parameters.pack(

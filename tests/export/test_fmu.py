@@ -163,8 +163,12 @@ def test_bits_are_those_of_casadis_machine(exported):
 
 
 def test_a_step_happens_at_every_sampling_instant_whatever_the_master_does(exported):
-    constant = np.tile(rows(exported.step, 1), (40, 1))
+    # At rest but for a small step of the reference: no two samples give the same torques.
+    n = exported.step.robot.joint_count
+    row = np.hstack([exported.step.robot.home, np.zeros(n), np.full(3, 1.0), np.full(3, 1.02)])
+    constant = np.tile(row, (40, 1))
     expected = reference_run(exported.step, constant)[0]
+    assert len(np.unique(expected, axis=0)) == 40
     # Thirds of a period, whole periods, several at once: 12 + 8 + 20 periods.
     sizes = [PERIOD / 3] * 36 + [PERIOD] * 8 + [4 * PERIOD] * 5
     slave = start(exported, constant[0])

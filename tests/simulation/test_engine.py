@@ -2,23 +2,33 @@
 
 from __future__ import annotations
 
+from itertools import pairwise
+
 import numpy as np
 import pytest
 from scipy.integrate import solve_ivp
 
+from mrac_design.motion.signal import PiecewisePolynomial
 from mrac_design.simulation.compilation import find_compiler
-from mrac_design.simulation.engine import CompiledEngine, InterpretedEngine
+from mrac_design.simulation.engine import CompiledEngine, InterpretedEngine, LlvmEngine
+from mrac_design.simulation.method import ErrorControl, TaylorSeries
 from mrac_design.simulation.run import Recording, RunSettings, run
-from mrac_design.simulation.tableau import DORMAND_PRINCE_5, RK4
+from mrac_design.simulation.tableau import DORMAND_PRINCE_5, DORMAND_PRINCE_8, RK4
 from tests.simulation.small_systems import INITIAL_STATE, PARAMETER_VALUES, pendulum, pushes
+
+METHODS = (
+    RK4,
+    DORMAND_PRINCE_5,
+    DORMAND_PRINCE_8,
+    TaylorSeries(order=6),
+    TaylorSeries(order=8, control=ErrorControl(relative=1e-9, absolute=1e-9)),
+)
 
 needs_compiler = pytest.mark.skipif(find_compiler() is None, reason="no C compiler here")
 
 
 def compiled(system, method, inputs):
-    return CompiledEngine(
-        system, method, input_powers=inputs.degree + 1, compiler=find_compiler()
-    )
+    return CompiledEngine(system, method, input_powers=inputs.degree + 1, compiler=find_compiler())
 
 
 def recording_of(engine, system, inputs, *, step=1e-3, duration=2.0, record_period=0.01):
@@ -35,7 +45,7 @@ def recording_of(engine, system, inputs, *, step=1e-3, duration=2.0, record_peri
 def dop853(system, inputs, *, duration=2.0):
     """Final state by SciPy, restarted where the inputs jump; no memory."""
     state, borders = INITIAL_STATE, inputs.breakpoints
-    for index, (start, end) in enumerate(zip(borders[:-1], borders[1:], strict=True)):
+    for index, (start, end) in enumerate(pairwise(borders)):
         piece = inputs.coefficients[:, index, ::-1]
 
         def slopes(t, x, piece=piece, start=start):
@@ -54,7 +64,9 @@ def final_error(method, step, exact, system, inputs):
 
 
 @needs_compiler
-@pytest.mark.parametrize("method", [RK4, DORMAND_PRINCE_5], ids=lambda method: method.name)
+@pytest.mark.parametrize(
+    "method", [RK4, DORMAND_PRINCE_5, TaylorSeries(order=4)], ids=lambda method: method.name
+)
 def test_error_falls_with_the_methods_order_though_inputs_jump(method):
     system, inputs = pendulum(), pushes()
     exact = dop853(system, inputs)
@@ -67,14 +79,52 @@ def test_error_falls_with_the_methods_order_though_inputs_jump(method):
 
 @needs_compiler
 @pytest.mark.parametrize("sampling_period", [None, 0.005])
-@pytest.mark.parametrize("method", [RK4, DORMAND_PRINCE_5], ids=lambda method: method.name)
-def test_compiled_and_interpreted_runs_have_the_same_bits(method, sampling_period):
+@pytest.mark.parametrize("method", METHODS, ids=lambda method: method.name)
+def test_three_machines_agree(method, sampling_period):
+    pytest.importorskip("llvmlite")
     system, inputs = pendulum(sampling_period=sampling_period), pushes()
-    fast = compiled(system, method, inputs)
-    slow = InterpretedEngine(system, method, input_powers=inputs.degree + 1)
-    one, other = (recording_of(engine, system, inputs, step=0.002) for engine in (fast, slow))
-    assert np.array_equal(one.outputs, other.outputs)
-    assert np.array_equal(one.final_state, other.final_state)
+    engines = (
+        compiled(system, method, inputs),
+        LlvmEngine(system, method, input_powers=3),
+        InterpretedEngine(system, method, input_powers=3),
+    )
+    c, llvm, casadi = (recording_of(engine, system, inputs, step=0.01) for engine in engines)
+    assert np.array_equal(c.outputs, llvm.outputs)
+    assert np.array_equal(c.final_state, llvm.final_state)
+    # CasADi rounds a product before its sum, the others do not.
+    np.testing.assert_allclose(casadi.outputs, c.outputs, rtol=1e-12, atol=1e-13)
+
+
+@needs_compiler
+def test_error_control_shortens_steps_until_the_error_is_allowed():
+    system, inputs = pendulum(), pushes()
+    exact = dop853(system, inputs)
+    errors = []
+    for allowed in (1e-5, 1e-8, 1e-11):
+        control = ErrorControl(relative=allowed, absolute=allowed)
+        method = TaylorSeries(order=8, control=control)
+        errors.append(final_error(method, 0.5, exact, system, inputs))
+    assert final_error(TaylorSeries(order=8), 0.5, exact, system, inputs) > 1e-4
+    # What two seconds of steps add up to.
+    assert errors[0] < 1e-4
+    assert errors[1] < 1e-7
+    assert errors[2] < 1e-10
+
+
+@needs_compiler
+def test_denormal_numbers_are_zero_inside_a_run_and_live_outside():
+    """A number below 2e-308 counts as 0 and does not slow anything down."""
+    system, inputs = pendulum(), pushes(jump=0.0)
+    still = PiecewisePolynomial(breakpoints=[0.0, 2.0], coefficients=np.zeros((2, 1, 3)))
+    tiny = np.array([0.0, 0.0, 3e-310])
+    engine = compiled(system, RK4, inputs)
+    settings = RunSettings(duration=1.0, step=1e-3, record_period=0.1)
+    final = run(
+        engine, system, inputs=still, parameters=PARAMETER_VALUES, initial_state=tiny,
+        settings=settings,
+    ).final_state  # fmt: skip
+    assert final[2] == 0.0
+    assert np.float64(1e-300) * np.float64(1e-10) > 0
 
 
 @needs_compiler

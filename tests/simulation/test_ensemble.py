@@ -166,7 +166,9 @@ def test_store_of_another_ensemble_is_refused(tmp_path):
 
 
 def test_fingerprint_is_the_same_in_another_process():
-    code = "from tests.simulation.ensemble_problem import pendulums; print(pendulums().fingerprint())"
+    code = (
+        "from tests.simulation.ensemble_problem import pendulums; print(pendulums().fingerprint())"
+    )
     root = Path(__file__).parents[2]
     told = subprocess.run(
         [sys.executable, "-c", code], capture_output=True, text=True, cwd=root, check=True
@@ -184,10 +186,12 @@ def test_cluster_with_a_worker_killed_gives_the_same_table():
     ) as cluster:
         victim = cluster.workers[0].pid
 
-        def kill_once(fraction, done=[]):
-            if fraction > 0.1 and not done:
+        killed = []
+
+        def kill_once(fraction):
+            if fraction > 0.1 and not killed:
                 os.kill(victim, signal.SIGKILL)
-                done.append(fraction)
+                killed.append(victim)
 
         workers = DaskCluster(address=cluster.scheduler_address)
         result = run_ensemble(problem, workers=workers, progress=kill_once)

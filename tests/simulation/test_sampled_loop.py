@@ -12,7 +12,10 @@ from mrac_design.errors import ParameterError
 from mrac_design.motion.signal import PiecewisePolynomial, quintic_hermite, stack
 from mrac_design.robot import inertial_parameters
 from mrac_design.simulation.closed_loop import build_force_loop, resting_state
+from mrac_design.simulation.contact import LinearSpring
+from mrac_design.simulation.encoder import ExactJoints
 from mrac_design.simulation.engine import InterpretedEngine, build_engine
+from mrac_design.simulation.friction import Frictionless
 from mrac_design.simulation.run import Recording, RunSettings, run
 from mrac_design.simulation.sampled_loop import (
     ComputationalDelay,
@@ -61,9 +64,11 @@ def sampled_loop(
     return build_sampled_loop(
         dynamics_of(ROBOT),
         robot_step(ROBOT, period=period),
-        stiffness=STIFFNESS,
+        contact=LinearSpring(STIFFNESS),
+        friction=Frictionless(),
         delay=ComputationalDelay(delay),
         sensor=sensor,
+        joints=ExactJoints(),
     )
 
 
@@ -168,7 +173,7 @@ def test_converges_to_the_continuous_loop():
     inputs = motion_and_reference(end, amplitude=3e-3)
     loop = build_force_loop(
         dynamics_of(ROBOT), linearisation_of(ROBOT), [controller_of(Continuous())] * 2,
-        stiffness=STIFFNESS,
+        contact=LinearSpring(STIFFNESS), friction=Frictionless(),
     )  # fmt: skip
     start = resting_state(
         loop, posture=loop.dynamics.description.home, force=[1.0, 1.0], condition_limit=100.0
@@ -271,8 +276,9 @@ def test_noise_is_a_function_of_its_seed():
         (lambda: gaussian_noise(deviation=1.0, period=0.0, duration=1.0, seed=1), "period"),
         (
             lambda: build_sampled_loop(
-                dynamics_of("d2m2_set_a"), robot_step(ROBOT), stiffness=STIFFNESS,
-                delay=ComputationalDelay(0), sensor=PERFECT_SENSOR,
+                dynamics_of("d2m2_set_a"), robot_step(ROBOT),
+                contact=LinearSpring(STIFFNESS), friction=Frictionless(),
+                delay=ComputationalDelay(0), sensor=PERFECT_SENSOR, joints=ExactJoints(),
             ),
             "other joints or force axes",
         ),

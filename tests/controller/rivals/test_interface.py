@@ -2,13 +2,18 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
+from mrac_design.controller.rivals.active_observer import active_observer
 from mrac_design.controller.rivals.linear import build_linear_step
 from mrac_design.time_domain import Discrete
 from tests.controller.rivals.cases import (
     DELAY,
+    FORCE_LOOP,
+    OBSERVER,
     PERIOD,
     PREVIEW,
     STIFFNESS,
@@ -94,11 +99,6 @@ def test_feedback_is_the_same_loop(name):
 
 
 def test_coefficients_are_parameters_so_retuning_keeps_the_code():
-    from dataclasses import replace
-
-    from mrac_design.controller.rivals.active_observer import active_observer
-    from tests.controller.rivals.cases import FORCE_LOOP, OBSERVER
-
     retuned = build_linear_step(
         active_observer(replace(OBSERVER, force_loop=replace(FORCE_LOOP, time_constant=0.006)))
     )
