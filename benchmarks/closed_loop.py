@@ -17,7 +17,8 @@ from mrac_design.simulation.lanes import LANES, Case, LaneEngine
 from mrac_design.simulation.method import Method
 from mrac_design.simulation.reduction import tracking_reduction
 from mrac_design.simulation.schedule import build_schedule
-from mrac_design.simulation.tableau import DORMAND_PRINCE_5, DORMAND_PRINCE_8, RK4
+from mrac_design.simulation.dormand_prince_8 import DORMAND_PRINCE_8
+from mrac_design.simulation.tableau import DORMAND_PRINCE_5, RK4
 
 ACCEPTED = 1e-3
 """Largest force error (N) with which a contestant counts as solving the problem."""

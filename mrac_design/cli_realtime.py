@@ -108,13 +108,8 @@ def _print(report: RealtimeReport) -> None:
     for run in report.runs:
         _say(f"{run.rate:g} Hz: torques against the simulation's: {run.agreement}")
         _say(f"    {_conditions(run)}")
-    costs = report.runs[0].costs
-    counted = (
-        "instructions not counted"
-        if costs.instructions is None
-        else f"{costs.instructions:.0f} instructions"
-    )
-    _say(f"a step: {costs.operations} operations, {counted} ({costs.tools})")
+    for text in dict.fromkeys(_cost(run) for run in report.runs):
+        _say(text)
     _say(f"measured on {report.machine}")
 
 
@@ -142,6 +137,12 @@ def _conditions(run: RealtimeRun) -> str:
         f"memory lock {lock}, real-time priority {priority}, {record.page_faults} page faults, "
         f"preempted {record.preemptions} times, clock read in {1e9 * record.clock_cost:.0f} ns"
     )
+
+
+def _cost(run: RealtimeRun) -> str:
+    costs = run.costs
+    count = "not counted" if costs.instructions is None else f"{costs.instructions:.0f}"
+    return f"a step: {costs.operations} operations, instructions {count} ({costs.tools})"
 
 
 def _say(text: str) -> None:

@@ -16,16 +16,15 @@ from dataclasses import dataclass
 
 import numpy as np
 from scipy.integrate import trapezoid
-from scipy.signal import lfilter
+from scipy.signal import lfilter, lsim
 
 from mrac_design.arrays import FloatArray, readonly
-from mrac_design.controller.adaptive import GAIN_NAMES
 from mrac_design.design import RSTDesign
 from mrac_design.errors import ParameterError
 from mrac_design.simulation.trajectory import Trajectory
 
 MODEL_GAINS = 5
-"""Adapted gains that the error model knows: r1', s0, s1, t0, t1."""
+"""Adapted gains that the error model knows: r1', s0, s1, t0, t1; a bias counts as disturbance."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -158,8 +157,6 @@ def _axis_signals(
     phi = np.stack([zu2, zy1, zy2, -(model_force / omega**2 - ao * xc), -xc], axis=1)
     regressor = b0 * design.scaling[:MODEL_GAINS] * phi
     gains = trajectory["adapted_gains"][:, index * count : (index + 1) * count][:, :MODEL_GAINS]
-    # A bias beside the error model's five gains would be part of the disturbance here.
-    assert len(GAIN_NAMES) >= MODEL_GAINS
     caused = (regressor * (design.scaled_parameters[:MODEL_GAINS] - gains)).sum(axis=1)
     augmentation = -(b0 * (zu1 + ao * zu2) + (regressor * gains).sum(axis=1))
     return AdaptationSignals(
@@ -194,8 +191,6 @@ class _LowPass:
         self, values: FloatArray, omega: float, damping: float
     ) -> tuple[FloatArray, FloatArray]:
         """Responses of p/Am and 1/Am, which start settled on the first value."""
-        from scipy.signal import lsim
-
         A = [[-2 * damping * omega, -(omega**2)], [1.0, 0.0]]
         system = (A, [[1.0], [0.0]], np.eye(2), np.zeros((2, 1)))
         time = self.period * np.arange(len(values))

@@ -327,8 +327,9 @@ def _worst_energy(loops: _Spans, path: NDArray[np.int_]) -> float:
     disturbance = np.ones(lifted.shape[1])
     gain = 0.0
     for _ in range(POWER_STEPS):
+        disturbance /= np.linalg.norm(disturbance)
         force = lifted @ disturbance
-        gain = float(np.linalg.norm(force) / np.linalg.norm(disturbance))
+        gain = float(np.linalg.norm(force))
         disturbance = lifted.T @ force
     return gain * float(np.sqrt(share))
 

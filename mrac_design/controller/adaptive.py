@@ -24,6 +24,7 @@ import numpy as np
 from mrac_design.arrays import FloatArray, readonly
 from mrac_design.controller.adaptation import AdaptationLaw, AdaptationSignals
 from mrac_design.controller.advance import integral_advance, linear_advance
+from mrac_design.controller.assembly import StepSymbols, assemble_step
 from mrac_design.controller.oscillator import (
     HarmonicSignals,
     Oscillator,
@@ -49,14 +50,6 @@ _STATE = Layout(
         ("gains", len(GAIN_NAMES)),
         ("model", 2),
         ("prefilter", 2),
-    )
-)
-_SIGNALS = Layout(
-    (
-        ("desired_force", 1),
-        ("model_force", 1),
-        ("augmented_error", 1),
-        ("adapted_gains", len(GAIN_NAMES)),
     )
 )
 
@@ -101,11 +94,11 @@ def nominal_gains(design: RSTDesign) -> tuple[float, ...]:
 def build_step(controller: AdaptiveRST) -> ControllerStep:
     """The controller as CasADi functions; see `ControllerStep` for shapes and units."""
     values = _parameter_values(controller)
-    layout, reported = _layouts(controller)
+    layout = _layout(controller)
     parameters = Layout(tuple((name, value.size) for name, value in values.items()))
-    x, p = layout.symbols("state"), parameters.symbols("parameters")
-    force, reference, applied = (ca.SX.sym(n) for n in ("force", "reference", "applied_command"))
-    state, symbols = layout.split(x), parameters.split(p)
+    step = StepSymbols.of(layout, parameters)
+    state, symbols = layout.split(step.state), parameters.split(step.parameters)
+    force, reference = step.force, step.reference
 
     reference_signal = _reference_path(state, symbols, reference)
     harmonic = _harmonic_signals(controller, state, symbols)
@@ -132,9 +125,12 @@ def build_step(controller: AdaptiveRST) -> ControllerStep:
 
     advanced = _advanced_gains(controller, symbols, moving, rate)
     own = len(GAIN_NAMES)
-    following = layout.join(
-        {
-            "filtered_command": _filter(symbols, state["filtered_command"], applied),
+    return assemble_step(
+        step,
+        values=parameters.pack(values),
+        command=command,
+        following={
+            "filtered_command": _filter(symbols, state["filtered_command"], step.applied),
             "filtered_force": _filter(symbols, state["filtered_force"], force),
             "filtered_reference": _filter(
                 symbols, state["filtered_reference"], reference_signal.input
@@ -143,45 +139,23 @@ def build_step(controller: AdaptiveRST) -> ControllerStep:
             "model": _second_order_step(symbols, "model", state["model"], reference_signal.input),
             "prefilter": _second_order_step(symbols, "prefilter", state["prefilter"], reference),
             **_oscillator_following(controller, symbols, state, gains, rate, advanced),
-        }
-    )
-    signals = reported.join(
-        {
+        },
+        signals={
             "desired_force": reference_signal.desired,
             "model_force": state["model"][1],
             "augmented_error": error,
             "adapted_gains": gains[:own],
             **({"heart_rate": state["oscillator"][1]} if controller.oscillator else {}),
-        }
-    )
-    names = ["state", "force", "reference"]
-    return ControllerStep(
-        state=layout,
-        parameters=parameters,
-        signals=reported,
-        parameter_values=parameters.pack(values),
-        command=ca.Function(
-            "command", [x, force, reference, p], [command], [*names, "parameters"], ["command"]
-        ),
-        advance=ca.Function(
-            "advance",
-            [x, force, reference, applied, p],
-            [following, signals],
-            [*names, "applied_command", "parameters"],
-            ["next", "signals"],
-        ),
-        equilibrium=_equilibrium(layout, symbols, p),
+        },
+        rest=_resting_state(layout, symbols, force),
     )
 
 
-def _layouts(controller: AdaptiveRST) -> tuple[Layout, Layout]:
-    """State and signals, with those of the oscillator if there is one."""
+def _layout(controller: AdaptiveRST) -> Layout:
+    """State, with that of the oscillator if there is one."""
     if controller.oscillator is None:
-        return _STATE, _SIGNALS
-    return (
-        Layout((*_STATE.blocks, *controller.oscillator.blocks)),
-        Layout((*_SIGNALS.blocks, ("heart_rate", 1))),
-    )
+        return _STATE
+    return Layout((*_STATE.blocks, *controller.oscillator.blocks))
 
 
 def _joined(blocks: Mapping[str, ca.SX], first: str, second: str) -> ca.SX:
@@ -340,9 +314,8 @@ def _second_order_step(symbols: Mapping[str, ca.SX], name: str, x: ca.SX, v: ca.
     return ca.vertcat(A[0] * x[0] + A[1] * x[1] + b[0] * v, A[2] * x[0] + A[3] * x[1] + b[1] * v)
 
 
-def _equilibrium(layout: Layout, symbols: Mapping[str, ca.SX], p: ca.SX) -> ca.Function:
+def _resting_state(layout: Layout, symbols: Mapping[str, ca.SX], force: ca.SX) -> ca.SX:
     """At rest y = u_c = F: the filters have settled on F and the command is zero."""
-    force = ca.SX.sym("force")
     settled = ca.vertcat(
         force / symbols["ao"], 0, force / (symbols["ao"] * symbols["bandwidth"] ** 2)
     )
@@ -358,5 +331,4 @@ def _equilibrium(layout: Layout, symbols: Mapping[str, ca.SX], p: ca.SX) -> ca.F
         harmonics = dict(layout.blocks)["harmonic_gains"]
         resting["harmonic_gains"] = ca.SX.zeros(harmonics)
         resting["oscillator"] = ca.vertcat(0, symbols["oscillator_start"])
-    state = layout.join(resting)
-    return ca.Function("equilibrium", [force, p], [state], ["force", "parameters"], ["state"])
+    return layout.join(resting)

@@ -16,7 +16,7 @@ from mrac_design.errors import CompilationError
 from mrac_design.simulation.compilation import compile_library, find_compiler
 from mrac_design.simulation.emission import simplified
 from mrac_design.simulation.llvm_program import llvm_program
-from mrac_design.simulation.method import Method
+from mrac_design.simulation.method import Method, spans_records
 from mrac_design.simulation.program import c_program
 from mrac_design.simulation.schedule import Schedule
 from mrac_design.simulation.stepping import finished, prepare, step_program
@@ -30,6 +30,8 @@ class Engine(Protocol):
 
     name: str
     """Shown to people: which machine it is."""
+    spanning: bool
+    """Whether it takes schedules whose steps span several records."""
 
     def run(
         self,
@@ -71,6 +73,8 @@ class NativeEngine:
 
     name: str
     """Shown to people."""
+    spanning = False
+    """Whether it takes schedules whose steps span several records."""
 
     def __init__(self, entry: Any, *, outputs: int, powers: int) -> None:
         self._run = entry
@@ -102,6 +106,7 @@ class CompiledEngine(NativeEngine):
     def __init__(
         self, system: HybridSystem, method: Method, *, input_powers: int, compiler: str
     ) -> None:
+        self.spanning = spans_records(method)
         library = compile_library(c_program(system, method, input_powers=input_powers), compiler)
         super().__init__(run_entry(library.run), outputs=system.outputs.size, powers=input_powers)
 
@@ -147,6 +152,7 @@ class InterpretedEngine:
 
     def __init__(self, system: HybridSystem, method: Method, *, input_powers: int) -> None:
         self.name = "CasADi interpreter"
+        self.spanning = False
         self._outputs = system.outputs.size
         rate, output = prepare(system.rate), prepare(system.output)
         self._rate_setup = casadi_function(rate.setup, "rate_setup")

@@ -235,6 +235,7 @@ def chunk_metrics(ensemble: Ensemble, engine: GroupEngine, number: int) -> Float
             step=ensemble.settings.step,
             record_period=ensemble.settings.record_period,
             sampling_period=ensemble.system.sampling_period,
+            spanning=engine.spanning,
         )
         for first in range(0, len(group), LANES):
             part = group[first : first + LANES]

@@ -14,7 +14,7 @@ from mrac_design.arrays import FloatArray, readonly
 from mrac_design.motion.signal import PiecewisePolynomial
 from mrac_design.simulation.compilation import compile_library
 from mrac_design.simulation.engine import Engine, run_entry, run_part
-from mrac_design.simulation.method import Method
+from mrac_design.simulation.method import Method, spans_records
 from mrac_design.simulation.program import c_program
 from mrac_design.simulation.reduction import Reduction
 from mrac_design.simulation.schedule import Schedule
@@ -51,6 +51,9 @@ class Case:
 class GroupEngine(Protocol):
     """Runs cases that share a schedule."""
 
+    spanning: bool
+    """Whether it takes schedules whose steps span several records."""
+
     def accumulate(self, schedule: Schedule, cases: Sequence[Case]) -> FloatArray:
         """Accumulators of every case, shape (cases, k); NaN where a run left the numbers."""
 
@@ -75,6 +78,7 @@ class LaneEngine:
             lanes=lanes,
             reduction=reduction.over(system),
         )
+        self.spanning = spans_records(method)
         self._run = run_entry(compile_library(source, compiler).run)
         self._system = system
         self._reduction = reduction
@@ -103,6 +107,7 @@ class RecordingEngine:
     def __init__(
         self, system: HybridSystem, reduction: Reduction, engine: Engine, *, input_powers: int
     ) -> None:
+        self.spanning = engine.spanning
         self._system = system
         self._reduction = reduction
         self._engine = engine

@@ -47,3 +47,9 @@ class TaylorSeries:
 
 Method = ButcherTableau | TaylorSeries
 """Any integration method."""
+
+
+def spans_records(method: Method) -> bool:
+    """Whether the method knows the solution inside its steps, so that they may be longer than
+    the time between records."""
+    return isinstance(method, ButcherTableau) and method.extension is not None

@@ -85,7 +85,9 @@ long run(long n, const double *start, const double *length, const long long *sub
 {{
     const unsigned before = flush_denormals();
     real v[NV + 1], prepared[PREPARED + 1], ready[READY + 1];
-    real x[WIDTH + 1], y[WIDTH + 1], k[STAGES][WIDTH + 1];
+    real x[WIDTH + 1], y[WIDTH + 1], k[STAGES][WIDTH + 1], base[WIDTH + 1];
+    double since = 0.0, last = 1.0;
+    memset(base, 0, sizeof base);
     memset(x, 0, sizeof x);
     memset(k, 0, sizeof k);
     memcpy(x, state, NX * sizeof *x);
@@ -94,15 +96,29 @@ long run(long n, const double *start, const double *length, const long long *sub
     record_setup(p, ready);
     for (long i = 0; i < n; ++i) {{
         const real *c = coefficients + (size_t)segment[i] * NV * POWERS;
+        const real *at = x;
+        if (substeps[i] == 0) {{
+            /* Inside the step before: the method tells the solution there. */
+            between(base, k, last, (offset[i] - since) / last, y);
+            at = y;
+        }}
         if (records[i] || updates[i]) inputs_at(c, splat(offset[i]), v);
         if (updates[i]) sample(x, z, v, p);
         if (records[i]) {{
             {record}
             ++rows;
         }}
+        if (substeps[i] == 0) continue;
         const double h = length[i] / (double)substeps[i];
+        const int spans = i + 1 < n && substeps[i + 1] == 0;
+        if (spans) {{
+            memcpy(base, x, sizeof base);
+            since = offset[i];
+            last = h;
+        }}
         for (long long j = 0; j < substeps[i]; ++j)
             step(x, z, c, p, prepared, offset[i] + (double)j * h, h, k, y);
+        if (spans) extend(base, x, z, c, p, prepared, since, h, k, y);
     }}
     memcpy(state, x, NX * sizeof *x);
     restore_denormals(before);
@@ -119,6 +135,31 @@ static void step(real *restrict x, const real *restrict z, const real *restrict 
     real v[NV + 1];
 {code}
 }}
+"""
+
+_EXTENSION = """\
+/* Further evaluations of the step from `base` to `x` that tell the solution between them. */
+static void extend(const real *restrict base, const real *restrict x, const real *restrict z,
+                   const real *restrict segment, const real *restrict p,
+                   const real *restrict prepared, double s, double h,
+                   real (*restrict k)[WIDTH + 1], real *restrict y)
+{{
+    real v[NV + 1];
+{code}
+}}
+
+/* The state after the share `theta` of the step of length h from `base`. */
+static void between(const real *restrict base, real (*restrict k)[WIDTH + 1], double h,
+                    double theta, real *restrict y)
+{{
+{weights}
+    for (int i = 0; i < WIDTH; ++i) y[i] = base[i] + h * ({sum});
+}}
+"""
+
+_NO_EXTENSION = """\
+#define extend(base, x, z, c, p, prepared, since, h, k, y) (void)0
+#define between(base, k, h, theta, y) (void)0
 """
 
 _SERIES = """\
@@ -138,10 +179,10 @@ static void step(real *restrict x, const real *restrict z, const real *restrict 
 }}
 """
 
-_RECORD = "output(x, z, v, p, ready, recorded + (size_t)NY * rows);"
+_RECORD = "output(at, z, v, p, ready, recorded + (size_t)NY * rows);"
 _REDUCE = """const real now = splat(start[i]);
             real next[NY + 1];
-            fold(x, z, v, p, recorded, &now, ready, next);
+            fold(at, z, v, p, recorded, &now, ready, next);
             memcpy(recorded, next, NY * sizeof *next);"""
 
 
@@ -175,7 +216,7 @@ def c_program(
     return _TEMPLATE.format(
         support=support(lanes),
         states=system.state.size,
-        stages=method.stages if isinstance(method, ButcherTableau) else 1,
+        stages=_evaluations(method),
         held=system.held.size,
         inputs=system.inputs.size,
         outputs=size,
@@ -194,10 +235,48 @@ def _step(
 ) -> tuple[str, list[str]]:
     if isinstance(method, ButcherTableau):
         code = "\n".join(_stage_lines(method))
-        step = _RUNGE_KUTTA.format(name=method.name, code=code)
+        step = _RUNGE_KUTTA.format(name=method.name, code=code) + _extension(method)
         return step, [c_routine(finished(rate.body), "rate")]
     advance = step_program(system, rate, method, powers)
-    return _SERIES.format(name=method.name), [c_routine(advance, "advance")]
+    step = _SERIES.format(name=method.name) + _NO_EXTENSION
+    return step, [c_routine(advance, "advance")]
+
+
+def _evaluations(method: Method) -> int:
+    """Slopes kept of a step."""
+    if not isinstance(method, ButcherTableau):
+        return 1
+    return method.stages if method.extension is None else method.extension.weights.shape[0]
+
+
+def _extension(method: ButcherTableau) -> str:
+    extension = method.extension
+    if extension is None:
+        return _NO_EXTENSION
+    first = method.stages
+    lines = [
+        "    inputs_at(segment, splat(s + h), v);",
+        f"    rate(x, z, v, p, prepared, k[{first}]);",
+    ]
+    for number, (row, fraction) in enumerate(zip(extension.a, extension.c, strict=True)):
+        value = _combination(row).replace("x[i]", "base[i]")
+        lines += [
+            f"    for (int i = 0; i < WIDTH; ++i) y[i] = {value};",
+            f"    inputs_at(segment, splat(s + {float(fraction)!r} * h), v);",
+            f"    rate(y, z, v, p, prepared, k[{first + 1 + number}]);",
+        ]
+    weights, terms = [], []
+    for number, row in enumerate(extension.weights):
+        if not row.any():
+            continue
+        value = repr(float(row[-1]))
+        for weight in row[-2::-1]:
+            value = f"({value} * theta + {float(weight)!r})"
+        weights.append(f"    const double b{number} = {value} * theta;")
+        terms.append(f"b{number} * k[{number}][i]")
+    return _EXTENSION.format(
+        code="\n".join(lines), weights="\n".join(weights), sum=" + ".join(terms)
+    )
 
 
 def _update(system: HybridSystem) -> str:

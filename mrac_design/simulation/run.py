@@ -69,6 +69,7 @@ def run(
         step=settings.step,
         record_period=settings.record_period,
         sampling_period=system.sampling_period,
+        spanning=engine.spanning,
     )
     coefficients = np.ascontiguousarray(inputs.coefficients.transpose(1, 0, 2))
     state, held = np.array(initial_state, dtype=float), np.zeros(system.held.size)
@@ -77,7 +78,8 @@ def run(
     time = schedule.start[schedule.records]
     rows: list[FloatArray] = []
     parts = max(1, int(schedule.substeps.sum()) // _PART)
-    edges = np.linspace(0, schedule.length.size, parts + 1).astype(int)
+    beginnings = np.append(np.flatnonzero(schedule.substeps), schedule.length.size)
+    edges = beginnings[np.linspace(0, beginnings.size - 1, parts + 1).astype(int)]
     for first, last in pairwise(edges):
         rows.append(engine.run(schedule, slice(first, last), coefficients, parameters, state, held))
         _require_finite(rows, time, state)

@@ -24,7 +24,8 @@ class Schedule:
     length: FloatArray
     """Length of each interval (s), shape (N,)."""
     substeps: NDArray[np.int64]
-    """Integration steps inside each interval, shape (N,)."""
+    """Integration steps inside each interval, shape (N,). Where one step spans several intervals
+    its length stands at the first, and the others have none."""
     segment: NDArray[np.int64]
     """Input segment each interval lies in, shape (N,)."""
     offset: FloatArray
@@ -42,9 +43,11 @@ def build_schedule(
     step: float,
     record_period: float,
     sampling_period: float | None,
+    spanning: bool = False,
 ) -> Schedule:
     """Stops of a run over [0, duration] s with integration steps of at most `step` s.
 
+    `spanning` steps may be longer than a recording interval (the engine interpolates).
     Raises ParameterError when a time is not positive or the inputs end before the run.
     """
     for name, value in (("duration", duration), ("step", step), ("record period", record_period)):
@@ -63,15 +66,41 @@ def build_schedule(
     start, length = stops[:-1], np.diff(stops)
     segment = np.searchsorted(inputs.breakpoints, start + length / 2, side="right") - 1
     segment = np.clip(segment, 0, inputs.segments - 1)
+    updates = _among(start, sampling, tolerance)
+    substeps = np.ceil(length / step - 1e-6).astype(np.int64).clip(min=1)
+    if spanning:
+        substeps, length = _spans(length, step, segment, updates, substeps)
     return Schedule(
         start=readonly(start),
         length=readonly(length),
-        substeps=np.ceil(length / step - 1e-6).astype(np.int64).clip(min=1),
+        substeps=substeps,
         segment=segment.astype(np.int64),
         offset=readonly(np.maximum(start - inputs.breakpoints[segment], 0.0)),
         records=_among(start, recording, tolerance),
-        updates=_among(start, sampling, tolerance),
+        updates=updates,
     )
+
+
+def _spans(
+    length: FloatArray,
+    step: float,
+    segment: NDArray[np.int64],
+    updates: NDArray[np.bool_],
+    substeps: NDArray[np.int64],
+) -> tuple[NDArray[np.int64], FloatArray]:
+    """Joins intervals to steps of at most `step` that no input's breakpoint or update cuts."""
+    # Plain lists: a loop over NumPy's numbers would take longer than the run it prepares.
+    counts, spans = substeps.tolist(), length.tolist()
+    cut = (updates[1:] | (np.diff(segment) != 0)).tolist()
+    limit = step * (1 + 1e-6)
+    first, joined = 0, spans[0]
+    for i in range(1, len(spans)):
+        joined += spans[i]
+        if cut[i - 1] or joined > limit:
+            first, joined = i, spans[i]
+        else:
+            counts[i], spans[first] = 0, joined
+    return np.array(counts, dtype=np.int64), np.array(spans)
 
 
 def _multiples(period: float, end: float) -> FloatArray:

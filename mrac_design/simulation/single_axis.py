@@ -117,21 +117,10 @@ def build_sampled_axis_loop(
     A command computed from the measurement of instant k acts from instant k + `delay` on; the
     controller knows its own limited command at once. Other arguments as `build_axis_loop`.
     """
-    if not 0 < period < math.inf:
-        raise ParameterError("sampling period", period, "must be a positive time in s")
-    if int(delay) != delay or delay < 0:
-        raise ParameterError("delay", delay, "must be a whole number of samples >= 0")
+    _check_sampling(period, delay)
     values, parameters, inputs = _common(step, velocity_gain, stiffness, command_limit)
     state = Layout((("position", 1), ("velocity", 1)))
-    # The last entry of the pipeline acts on the plant.
-    held = Layout(
-        (
-            ("controller", step.state.size),
-            ("pipeline", int(delay) + 1),
-            ("measured", 1),
-            ("signals", step.signals.size),
-        )
-    )
+    held = _sampled_memory(step, int(delay))
     x, z, v, p = (
         state.symbols("state"),
         held.symbols("held"),
@@ -166,6 +155,25 @@ def build_sampled_axis_loop(
         update=update,
         period=period,
     )  # fmt: skip
+
+
+def _check_sampling(period: float, delay: int) -> None:
+    if not 0 < period < math.inf:
+        raise ParameterError("sampling period", period, "must be a positive time in s")
+    if int(delay) != delay or delay < 0:
+        raise ParameterError("delay", delay, "must be a whole number of samples >= 0")
+
+
+def _sampled_memory(step: ControllerStep, delay: int) -> Layout:
+    """What is held between samples; the last entry of the pipeline acts on the plant."""
+    return Layout(
+        (
+            ("controller", step.state.size),
+            ("pipeline", delay + 1),
+            ("measured", 1),
+            ("signals", step.signals.size),
+        )
+    )
 
 
 def axis_inputs(

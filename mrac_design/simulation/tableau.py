@@ -10,6 +10,30 @@ from mrac_design.arrays import FloatArray, readonly
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class ContinuousExtension:
+    """The solution between the ends of a step, from some more evaluations.
+
+    x(θ) = x + h Σ_i k_i Σ_d weights[i, d] θ^(d+1), 0 ≤ θ ≤ 1; the first evaluation beyond the
+    method's own is at the end of the step.
+    """
+
+    a: FloatArray
+    """Stage weights of the evaluations after that, shape (more, stages + 1 + more)."""
+    c: FloatArray
+    """Their instants as fractions of the step, shape (more,)."""
+    weights: FloatArray
+    """Shape (stages + 1 + more, degree)."""
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "c", readonly(self.c, (-1,)))
+        object.__setattr__(self, "a", readonly(self.a, (self.c.size, -1)))
+        object.__setattr__(self, "weights", readonly(self.weights, (self.a.shape[1], -1)))
+        # A constant slope gives a straight line.
+        line = self.weights.sum(axis=0)
+        assert np.abs(line - np.eye(line.size)[0]).max() < 1e-11, line
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class ButcherTableau:
     """Coefficients of an explicit Runge–Kutta method; consistency is checked on construction."""
 
@@ -21,6 +45,9 @@ class ButcherTableau:
     """Stage weights, strictly lower triangular, shape (stages, stages)."""
     b: FloatArray
     """Weights of the step, shape (stages,)."""
+
+    extension: ContinuousExtension | None = None
+    """What gives the solution inside a step, for methods with steps longer than a record."""
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "b", readonly(self.b, (-1,)))
@@ -62,101 +89,4 @@ DORMAND_PRINCE_5 = ButcherTableau(
         ]
     ),
     b=np.array([35 / 384, 0, 500 / 1113, 125 / 192, -2187 / 6784, 11 / 84]),
-)
-
-
-def _padded(rows: list[list[float]]) -> FloatArray:
-    """A square matrix from rows that leave out their zeros at the end."""
-    matrix = np.zeros((len(rows), len(rows)))
-    for line, row in zip(matrix, rows, strict=True):
-        line[: len(row)] = row
-    return matrix
-
-
-# Hairer, Nørsett and Wanner 1993, code DOP853: twelve stages, order 8.
-DORMAND_PRINCE_8 = ButcherTableau(
-    name="Dormand–Prince 8",
-    order=8,
-    a=_padded(
-        [
-            [],
-            [0.05260015195876773],
-            [0.0197250569845379, 0.0591751709536137],
-            [0.02958758547680685, 0, 0.08876275643042054],
-            [0.2413651341592667, 0, -0.8845494793282861, 0.924834003261792],
-            [0.037037037037037035, 0, 0, 0.17082860872947386, 0.12546768756682242],
-            [0.037109375, 0, 0, 0.17025221101954405, 0.06021653898045596, -0.017578125],
-            [
-                0.03709200011850479,
-                0,
-                0,
-                0.17038392571223998,
-                0.10726203044637328,
-                -0.015319437748624402,
-                0.008273789163814023,
-            ],
-            [
-                0.6241109587160757,
-                0,
-                0,
-                -3.3608926294469414,
-                -0.868219346841726,
-                27.59209969944671,
-                20.154067550477894,
-                -43.48988418106996,
-            ],
-            [
-                0.47766253643826434,
-                0,
-                0,
-                -2.4881146199716677,
-                -0.590290826836843,
-                21.230051448181193,
-                15.279233632882423,
-                -33.28821096898486,
-                -0.020331201708508627,
-            ],
-            [
-                -0.9371424300859873,
-                0,
-                0,
-                5.186372428844064,
-                1.0914373489967295,
-                -8.149787010746927,
-                -18.52006565999696,
-                22.739487099350505,
-                2.4936055526796523,
-                -3.0467644718982196,
-            ],
-            [
-                2.273310147516538,
-                0,
-                0,
-                -10.53449546673725,
-                -2.0008720582248625,
-                -17.9589318631188,
-                27.94888452941996,
-                -2.8589982771350235,
-                -8.87285693353063,
-                12.360567175794303,
-                0.6433927460157636,
-            ],
-        ]
-    ),
-    b=np.array(
-        [
-            0.054293734116568765,
-            0,
-            0,
-            0,
-            0,
-            4.450312892752409,
-            1.8915178993145003,
-            -5.801203960010585,
-            0.3111643669578199,
-            -0.1521609496625161,
-            0.20136540080403034,
-            0.04471061572777259,
-        ]
-    ),
 )

@@ -137,10 +137,12 @@ def test_a_wrong_frequency_is_found():
     assert residual(tracked) < 0.1 * residual(fixed)
 
 
-def test_the_frequency_stays_in_its_range():
+@pytest.mark.parametrize("domain", [Continuous(), SAMPLED])
+def test_the_frequency_stays_in_its_range(domain):
     narrow = replace(OSCILLATOR, frequency=1.2, highest=1.22, tracking=0.3)
-    frequency = run(narrow, gain=0.0)["heart_rate"] / (2 * np.pi)
-    assert frequency.max() == pytest.approx(1.22, abs=1e-9)
+    frequency = run(narrow, gain=0.0, domain=domain)["heart_rate"] / (2 * np.pi)
+    # An integration step may carry the continuous state over the border by its own length.
+    assert frequency.max() == pytest.approx(1.22, abs=1e-4)
     assert frequency.min() >= 0.8
 
 

@@ -13,7 +13,8 @@ from mrac_design.simulation.compilation import find_compiler
 from mrac_design.simulation.engine import CompiledEngine, InterpretedEngine, LlvmEngine
 from mrac_design.simulation.method import ErrorControl, TaylorSeries
 from mrac_design.simulation.run import Recording, RunSettings, run
-from mrac_design.simulation.tableau import DORMAND_PRINCE_5, DORMAND_PRINCE_8, RK4
+from mrac_design.simulation.dormand_prince_8 import DORMAND_PRINCE_8
+from mrac_design.simulation.tableau import DORMAND_PRINCE_5, RK4
 from tests.simulation.small_systems import INITIAL_STATE, PARAMETER_VALUES, pendulum, pushes
 
 METHODS = (
@@ -144,3 +145,30 @@ def test_inputs_are_recorded_right_continuous():
         compiled(system, RK4, inputs), system, inputs, record_period=0.3137, duration=1.0
     )
     assert recording.outputs[1, 2] == pytest.approx(0.7, abs=1e-15)
+
+
+@needs_compiler
+def test_steps_longer_than_a_record_are_interpolated():
+    """The same records as with a step for each, to the order of the interpolation (7)."""
+    system, inputs = pendulum(), pushes()
+    engine = compiled(system, DORMAND_PRINCE_8, inputs)
+    exact = recording_of(engine, system, inputs, step=0.01, record_period=0.01).outputs
+    errors = [
+        np.abs(recording_of(engine, system, inputs, step=step).outputs - exact).max()
+        for step in (0.32, 0.16)
+    ]
+    assert errors[0] > 1e-9
+    assert np.log2(errors[0] / errors[1]) > 6
+    coarse = recording_of(engine, system, inputs, step=0.08).outputs
+    assert np.abs(coarse - exact).max() < 1e-9
+
+
+@needs_compiler
+def test_long_steps_do_not_cross_updates():
+    system, inputs = pendulum(sampling_period=0.02), pushes()
+    engine = compiled(system, DORMAND_PRINCE_8, inputs)
+    fine = recording_of(engine, system, inputs, step=0.001, record_period=0.005)
+    long = recording_of(engine, system, inputs, step=1.0, record_period=0.005)
+    # The memory is the same at every record and the angle agrees to the error of 20 ms steps.
+    assert np.array_equal(fine.outputs[:, 4], long.outputs[:, 4])
+    assert np.abs(fine.outputs - long.outputs).max() < 1e-9

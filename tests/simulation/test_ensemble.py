@@ -29,7 +29,8 @@ from mrac_design.simulation.ensemble import (
 from mrac_design.simulation.lanes import LaneEngine
 from mrac_design.simulation.run import run
 from mrac_design.simulation.store import EnsembleStore
-from mrac_design.simulation.tableau import DORMAND_PRINCE_5, DORMAND_PRINCE_8, RK4
+from mrac_design.simulation.dormand_prince_8 import DORMAND_PRINCE_8
+from mrac_design.simulation.tableau import DORMAND_PRINCE_5, RK4
 from tests.simulation.ensemble_problem import pendulums
 
 pytestmark = pytest.mark.skipif(find_compiler() is None, reason="no C compiler here")

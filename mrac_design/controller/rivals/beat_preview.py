@@ -18,6 +18,7 @@ import control
 import numpy as np
 
 from mrac_design.arrays import FloatArray, readonly
+from mrac_design.controller.assembly import StepSymbols, assemble_step
 from mrac_design.controller.rivals.linear import Columns
 from mrac_design.controller.rivals.observation import (
     SampledModel,
@@ -105,24 +106,13 @@ def quadratic_gains(
 
 def beat_preview_step(specification: BeatPreview) -> ControllerStep:
     """The controller as CasADi functions, with the beat's age as an event."""
-    layout = Layout(
-        (
-            ("estimate", 3),
-            *pending_block("pending", specification.delay),
-            ("cells", specification.cells),
-            ("age", 1),
-            ("interval", 1),
-            PREFILTER,
-        )
-    )
+    layout = _layout(specification)
     values = _parameter_values(specification)
     parameters = Layout(tuple((name, int(value.size)) for name, value in values.items()))
-    x, p = layout.symbols("state"), parameters.symbols("parameters")
-    force, reference, applied, age = (
-        ca.SX.sym(n) for n in ("force", "reference", "applied_command", "beat_age")
-    )
-    state, symbols = layout.split(x), parameters.split(p)
-    columns = ca.vertcat(state["prefilter"], force, reference)
+    step = StepSymbols.of(layout, parameters, EVENTS)
+    state, symbols = layout.split(step.state), parameters.split(step.parameters)
+    columns = ca.vertcat(state["prefilter"], step.force, step.reference)
+    force, applied, age = step.force, step.applied, step.events
 
     filtered = state["estimate"] + symbols["kalman"] * (force - state["estimate"][0])
     waiting = ca.vertsplit(state["pending"]) if specification.delay else []
@@ -152,36 +142,31 @@ def beat_preview_step(specification: BeatPreview) -> ControllerStep:
     }
     if waiting:
         following["pending"] = ca.vertcat(applied, *waiting[:-1])
-    signals = Layout((("desired_force", 1), ("disturbance_estimate", 1)))
-    reported = signals.join(
-        {
+    resting = {name: ca.SX.zeros(length) for name, length in layout.blocks}
+    resting |= {"estimate": ca.vertcat(force, 0, 0), "prefilter": ca.vertcat(0, force)}
+    return assemble_step(
+        step,
+        values=parameters.pack(values),
+        command=command,
+        following=following,
+        signals={
             "desired_force": state["prefilter"][1],
             "disturbance_estimate": filtered[2] + now,
-        }
+        },
+        rest=layout.join(resting),
     )
-    level = ca.SX.sym("force")
-    resting = {name: ca.SX.zeros(length) for name, length in layout.blocks}
-    resting |= {"estimate": ca.vertcat(level, 0, 0), "prefilter": ca.vertcat(0, level)}
-    names = ["state", "force", "reference"]
-    return ControllerStep(
-        state=layout,
-        parameters=parameters,
-        signals=signals,
-        parameter_values=parameters.pack(values),
-        command=ca.Function(
-            "command", [x, force, reference, p], [command], [*names, "parameters"], ["command"]
-        ),
-        advance=ca.Function(
-            "advance",
-            [x, force, reference, applied, p, age],
-            [layout.join(following), reported],
-            [*names, "applied_command", "parameters", "events"],
-            ["next", "signals"],
-        ),
-        equilibrium=ca.Function(
-            "equilibrium", [level, p], [layout.join(resting)], ["force", "parameters"], ["state"]
-        ),
-        events=EVENTS,
+
+
+def _layout(specification: BeatPreview) -> Layout:
+    return Layout(
+        (
+            ("estimate", 3),
+            *pending_block("pending", specification.delay),
+            ("cells", specification.cells),
+            ("age", 1),
+            ("interval", 1),
+            PREFILTER,
+        )
     )
 
 

@@ -21,6 +21,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from mrac_design.arrays import FloatArray, readonly
+from mrac_design.controller.assembly import StepSymbols, assemble_step
 from mrac_design.controller.step import ControllerStep
 from mrac_design.errors import ParameterError
 from mrac_design.layout import Layout
@@ -135,52 +136,25 @@ def build_linear_step(controller: LinearController) -> ControllerStep:
     free = {name: _free_entries(rows) for name, rows in tables.items()}
     rest = layout.pack(controller.rest)
     parameters = Layout((*((name, len(at[0])) for name, at in free.items()), ("rest", layout.size)))
-    x, p = layout.symbols("state"), parameters.symbols("parameters")
-    inputs = tuple(ca.SX.sym(n) for n in ("force", "reference", "applied_command"))
-    state, symbols = layout.split(x), parameters.split(p)
-    vector = ca.vertcat(x, *inputs)
-
+    symbols = StepSymbols.of(layout, parameters)
+    state, numbers = layout.split(symbols.state), parameters.split(symbols.parameters)
+    vector = ca.vertcat(symbols.state, symbols.force, symbols.reference, symbols.applied)
     results = {
-        name: _combination(rows, free[name], symbols[name], vector) for name, rows in tables.items()
+        name: _combination(rows, free[name], numbers[name], vector) for name, rows in tables.items()
     }
     following = {name: results[f"next_{name}"] for name in controller.following} | {
         name: ca.vertcat(results[f"next_{name}"], *ca.vertsplit(state[name])[:-1])
         for name in controller.registers
     }
-    signals = Layout(
-        tuple((name, np.atleast_2d(rows).shape[0]) for name, rows in controller.signals.items())
-    )
-    reported = signals.join({name: results[f"signal_{name}"] for name in controller.signals})
-    force, reference, applied = inputs
-    names = ["state", "force", "reference"]
-    return ControllerStep(
-        state=layout,
-        parameters=parameters,
-        signals=signals,
-        parameter_values=parameters.pack(
+    return assemble_step(
+        symbols,
+        values=parameters.pack(
             {**{name: tables[name][at] for name, at in free.items()}, "rest": rest}
         ),
-        command=ca.Function(
-            "command",
-            [x, force, reference, p],
-            [results["command"]],
-            [*names, "parameters"],
-            ["command"],
-        ),
-        advance=ca.Function(
-            "advance",
-            [x, force, reference, applied, p],
-            [layout.join(following), reported],
-            [*names, "applied_command", "parameters"],
-            ["next", "signals"],
-        ),
-        equilibrium=ca.Function(
-            "equilibrium",
-            [force, p],
-            [force * symbols["rest"]],
-            ["force", "parameters"],
-            ["state"],
-        ),
+        command=results["command"],
+        following=following,
+        signals={name: results[f"signal_{name}"] for name in controller.signals},
+        rest=symbols.force * numbers["rest"],
     )
 
 

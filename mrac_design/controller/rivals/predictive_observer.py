@@ -59,11 +59,8 @@ class PredictiveObserver:
 
 def predictive_observer(specification: PredictiveObserver) -> LinearController:
     """The controller's equations."""
-    domain, horizon, delay = (
-        specification.time_domain,
-        specification.horizon,
-        specification.delay,
-    )
+    domain, delay = specification.time_domain, specification.delay
+    horizon = specification.horizon
     plant = sampled_plant(specification.plant, domain, delay=delay)
     augmented = plant.with_disturbance(*difference_chain(specification.order))
     drive = np.zeros((augmented.order, 1))
