@@ -13,11 +13,11 @@ from benchmarks.control_peer import PythonControl
 from benchmarks.heyoka_peer import HeyokaBatch, HeyokaRun
 from benchmarks.measure import Result, interleaved, timed
 from benchmarks.problem import RECORD, Problem
+from mrac_design.simulation.dormand_prince_8 import DORMAND_PRINCE_8
 from mrac_design.simulation.lanes import LANES, Case, LaneEngine
 from mrac_design.simulation.method import Method
 from mrac_design.simulation.reduction import tracking_reduction
 from mrac_design.simulation.schedule import build_schedule
-from mrac_design.simulation.dormand_prince_8 import DORMAND_PRINCE_8
 from mrac_design.simulation.tableau import DORMAND_PRINCE_5, RK4
 
 ACCEPTED = 1e-3
@@ -27,6 +27,8 @@ OURS: tuple[tuple[str, Method, float], ...] = (
     ("RK4 0.1 ms", RK4, 1e-4),
     ("Dormand–Prince 5, 1 ms", DORMAND_PRINCE_5, 1e-3),
     ("Dormand–Prince 5, 0.5 ms", DORMAND_PRINCE_5, 5e-4),
+    ("Dormand–Prince 8, 3 ms", DORMAND_PRINCE_8, 3e-3),
+    ("Dormand–Prince 8, 2 ms", DORMAND_PRINCE_8, 2e-3),
     ("Dormand–Prince 8, 1 ms", DORMAND_PRINCE_8, 1e-3),
 )
 
@@ -51,7 +53,9 @@ def single_runs(problem: Problem, compiler: str, *, rounds: int, say) -> list[Re
     reference = _reference(problem, compiler)
     contestants = [_ours(problem, compiler, *item) for item in OURS]
     if find_spec("heyoka"):
-        contestants += [_heyoka(problem, tolerance) for tolerance in (1e-4, 1e-6, 1e-8)]
+        contestants += [
+            _heyoka(problem, t, fold=f) for f in (False, True) for t in (1e-4, 1e-6, 1e-8)
+        ]
     else:
         say("heyoka is not installed: left out (pip install 'mrac-design[bench]')")
     contestants += [_casadi(problem, compiler, generated=flag) for flag in (True, False)]
@@ -103,12 +107,13 @@ def _ours(problem: Problem, compiler: str, name: str, method: Method, step: floa
     )  # fmt: skip
 
 
-def _heyoka(problem: Problem, tolerance: float) -> Contestant:
-    run, setup = timed(lambda: HeyokaRun(problem, tolerance))
-    note = "parameters folded into the code; states only, no outputs"
+def _heyoka(problem: Problem, tolerance: float, *, fold: bool) -> Contestant:
+    run, setup = timed(lambda: HeyokaRun(problem, tolerance, fold=fold))
+    family = "heyoka for these parameters only" if fold else "heyoka"
     return Contestant(
-        f"heyoka, tolerance {tolerance:g}", run, problem.forces, setup, problem.duration, note
-    )
+        f"{family}, tolerance {tolerance:g}", run, problem.forces, setup, problem.duration,
+        "states only, no outputs",
+    )  # fmt: skip
 
 
 def _casadi(problem: Problem, compiler: str, *, generated: bool) -> Contestant:
@@ -148,6 +153,7 @@ def _our_lanes(
         step=step,
         record_period=RECORD,
         sampling_period=None,
+        spanning=engine.spanning,
     )
     scalar = problem.engine(method, compiler)
     # A lane has the bits of the scalar run, so that one tells the error.

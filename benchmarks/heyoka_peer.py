@@ -63,20 +63,27 @@ _OPERATIONS = {
 class HeyokaRun:
     """One run, restarted at every breakpoint of the inputs, states on the records' grid."""
 
-    def __init__(self, problem: Problem, tolerance: float) -> None:
+    def __init__(self, problem: Problem, tolerance: float, *, fold: bool) -> None:
         import heyoka as hy
 
         self._problem = problem
         self._integrator = hy.taylor_adaptive(
-            heyoka_equations(problem, fold=True), list(problem.state), tol=tolerance
+            heyoka_equations(problem, fold=fold), list(problem.state), tol=tolerance
         )
+        self._own = problem.inputs.channels * (problem.inputs.degree + 1)
+        if not fold:
+            self._integrator.pars[self._own :] = problem.parameters[: self._used()]
+
+    def _used(self) -> int:
+        """Parameters heyoka knows of: up to the last that the equations name."""
+        return len(self._integrator.pars) - self._own
 
     def __call__(self) -> np.ndarray:
         inputs, integrator = self._problem.inputs, self._integrator
         integrator.state[:] = self._problem.state
         rows = []
         for index, grid, keep in segments(self._problem):
-            integrator.pars[:] = inputs.coefficients[:, index, :].ravel()
+            integrator.pars[: self._own] = inputs.coefficients[:, index, :].ravel()
             integrator.time = 0.0
             rows.append(np.asarray(integrator.propagate_grid(grid)[5])[keep])
         return np.vstack(rows)
@@ -100,7 +107,7 @@ class HeyokaBatch:
         inputs, integrator = self._problem.inputs, self._integrator
         integrator.state[:] = self._start
         count = inputs.channels * (inputs.degree + 1)
-        integrator.pars[count:] = parameters
+        integrator.pars[count:] = parameters[: len(integrator.pars) - count]
         rows = []
         for index, grid, keep in segments(self._problem):
             integrator.pars[:count] = inputs.coefficients[:, index, :].reshape(-1, 1)

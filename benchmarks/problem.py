@@ -110,9 +110,7 @@ def five_joint_loop(duration: float) -> Problem:
         build_step(variant_controller(scenario, design, VARIANTS[-1])),
         force=inputs(0.0)[3:6, 0],
     )
-    return Problem(
-        loop=ready.loop, state=np.array(ready.state), inputs=inputs, duration=duration
-    )
+    return Problem(loop=ready.loop, state=np.array(ready.state), inputs=inputs, duration=duration)
 
 
 def _as_recorded(inputs: PiecewisePolynomial) -> PiecewisePolynomial:

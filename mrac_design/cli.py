@@ -19,6 +19,7 @@ from rich.table import Table
 from mrac_design.cli_certify import certify, verify
 from mrac_design.cli_export import export
 from mrac_design.cli_options import DesignOptions, StudyOptions, takes
+from mrac_design.cli_realtime import realtime
 from mrac_design.errors import MracDesignError
 
 app = typer.Typer(
@@ -175,6 +176,7 @@ def check_model(
 app.command()(export)
 app.command()(certify)
 app.command()(verify)
+app.command()(realtime)
 
 
 def main() -> None:

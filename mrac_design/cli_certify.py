@@ -1,14 +1,15 @@
-"""`mrac certify` and `mrac verify`: certificates of the adaptive loop, made and re-checked."""
+"""`mrac certify`, `verify`, `stability`: certificates of the adaptive loop, made and re-checked."""
 
 from __future__ import annotations
 
+import json
 import sys
 from pathlib import Path
 from typing import Annotated
 
 import typer
 
-from mrac_design.cli_options import DesignOptions, takes
+from mrac_design.cli_options import DesignOptions, StudyOptions, takes
 
 
 @takes(DesignOptions)
@@ -54,10 +55,7 @@ def certify(
     )
     timing = Continuous() if rate is None else sampling(f"1/{rate}", delay)
     tissue = (softest or choice.stiffness, stiffest or choice.stiffness)
-    if box is None:
-        fraction = largest_box(loop, tissue, timing, resolution="0.01").fraction
-    else:
-        fraction = box
+    fraction = box or largest_box(loop, tissue, timing, resolution="0.01").fraction
     certificate = prove(loop, relative_box(loop, fraction, tissue), timing)
     if certificate.verdict is not Verdict.PROVED:
         typer.echo(f"{certificate.verdict.value}: {certificate.reason}", err=True)
@@ -81,3 +79,40 @@ def verify(
     from mrac_design.verify.__main__ import main
 
     sys.exit(main([str(certificate)]))
+
+
+@takes(StudyOptions)
+def stability(
+    options: StudyOptions,
+    out: Annotated[Path, typer.Option(help="Folder for the report.")] = Path("reports/stability"),
+    choices: Annotated[
+        str, typer.Option(help="What to certify and how hard to try it: packaged or a TOML file.")
+    ] = "paper",
+    as_json: Annotated[bool, typer.Option("--json", help="Print JSON for machines.")] = False,
+) -> None:
+    """Write the stability report: what is proved, checked, assumed and violated.
+
+    Example: mrac stability --out reports/stability
+    """
+    from rich.console import Console
+
+    from mrac_design.report.stability_report import write_stability_report
+
+    with Console(stderr=True).status("starting") as status:
+        report = write_stability_report(
+            options.chosen(),
+            out,
+            choices=choices,
+            progress=lambda message, fraction: status.update(f"{message}, {100 * fraction:.0f} %"),
+        )
+    if as_json:
+        typer.echo(json.dumps(report.values, indent=2, ensure_ascii=False))
+        return
+    typer.echo(f"asymptotic stability by the feedforward theorem: {report.values['theorem_5_9']}")
+    for title, found in report.values["designs"].items():
+        typer.echo(f"{title}, gains within ±{100 * found['box']:g} %: {found['verdict']}")
+        for bound, ratio in found["bound_over_simulated"].items():
+            typer.echo(f"  {bound.replace('$', '')}: bound over simulated {ratio:.3g}")
+    for certificate in report.certificates:
+        typer.echo(f"certificate: {certificate}")
+    typer.echo(f"Report: {out / 'report.html'}")

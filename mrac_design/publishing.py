@@ -46,3 +46,10 @@ def publish_folder(staged: Path, target: Path) -> None:
         previous.replace(target)
         raise
     shutil.rmtree(previous, ignore_errors=True)
+
+
+def publish_contents(staged: Path, target: Path) -> None:
+    """Rename everything finished in the folder `staged` into `target`, entry by entry."""
+    for finished in sorted(staged.iterdir()):
+        publish = publish_folder if finished.is_dir() else publish_file
+        publish(finished, target / finished.name)

@@ -83,7 +83,9 @@ def test_check_model_names_what_the_robot_is(mrac):
     assert mrac("check-model", "planar_2r")[0] == 0
 
 
-COMMANDS = ("report", "simulate", "design", "check-model", "export", "certify", "verify")
+COMMANDS = (
+    "report", "simulate", "design", "check-model", "export", "certify", "verify", "realtime",
+)  # fmt: skip
 
 
 @pytest.mark.parametrize("command", [(), *((name,) for name in COMMANDS)])

@@ -78,7 +78,7 @@ class AdaptationLoop:
 
 
 def regressor_square(design: RSTDesign, force: float, bias_force: float) -> float:
-    """|φ̂₀|² (N²) at rest at a constant `force` (N): s1 and t1 see ω F0/ao each, the bias its own."""
+    """|φ̂₀|² (N²) at rest at a constant `force` (N): s1 and t1 see ω F0/ao, the bias its own."""
     specification = design.specification
     ratio = specification.reference_model.bandwidth / specification.observer_pole
     return 2 * (ratio * force) ** 2 + bias_force**2

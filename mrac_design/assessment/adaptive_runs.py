@@ -6,7 +6,8 @@ any adaptation gain, on tissue of any stiffness in the range, under random heart
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
 
 import numpy as np
 from scipy.interpolate import CubicSpline
@@ -93,6 +94,72 @@ def adaptive_runs(
     )
 
 
+@dataclass(frozen=True, slots=True, kw_only=True)
+class MotionResponse:
+    """What one axis of a heart motion does to the force, proved and simulated."""
+
+    peak_disturbance: float
+    """sup |Ẍh + K2 Ẋh| (m/s²)."""
+    bound: float
+    """Certified bound of the force it causes (N)."""
+    simulated: float
+    """Largest force it causes in simulation, the law projected to its box (N)."""
+
+
+def motion_responses(
+    certificate: StabilityCertificate,
+    scenario: Scenario,
+    design: RSTDesign,
+    *,
+    displacement: PiecewisePolynomial,
+    axes: Sequence[str],
+) -> Mapping[str, MotionResponse]:
+    """Force that each channel of a `displacement` (m) causes, at zero reference, by axis.
+
+    Each run starts where that channel stands still for an instant, so that it starts from rest, as
+    the certified bound asks.
+    """
+    loop = _loop(certificate, scenario, design)
+    K2 = to_float(certificate.loop.velocity_gain)
+    found = {}
+    for index, axis in enumerate(axes):
+        heart = _from_standstill(displacement.selected([index]))
+        inputs = axis_inputs(
+            loop.step, heart=heart, reference=constant(0.0, heart.end), end=heart.end
+        )
+        settings = RunSettings(duration=heart.end, step=1e-4, record_period=5e-4)
+        trajectory = simulate_axis(loop, inputs=inputs, settings=settings)
+        d = peak_disturbance(heart, K2)
+        found[axis] = MotionResponse(
+            peak_disturbance=d,
+            bound=certificate.peak_gain * d,
+            simulated=float(np.abs(trajectory["force"]).max()),
+        )
+    return found
+
+
+def _from_standstill(channel: PiecewisePolynomial) -> PiecewisePolynomial:
+    """The motion from its first standstill on, starting at time 0."""
+    velocity = channel.derivative()
+    time = np.linspace(channel.start, channel.end, 20 * len(channel.breakpoints))
+    speeds = velocity(time)[0]
+    turns = np.flatnonzero(speeds[:-1] * speeds[1:] <= 0)
+    # The end is kept away from, so that a motion that never turns still leaves something to run.
+    first = int(turns[0]) if turns.size else 0
+    low, high = time[first], time[first + 1]
+    rising = speeds[first] < speeds[first + 1]
+    for _ in range(60):
+        middle = (low + high) / 2
+        if (velocity(middle)[0, 0] > 0) == rising:
+            high = middle
+        else:
+            low = middle
+    rest = channel.restricted(float(low), channel.end)
+    return PiecewisePolynomial(
+        breakpoints=rest.breakpoints - rest.breakpoints[0], coefficients=rest.coefficients
+    )
+
+
 def random_heart(rng: np.random.Generator) -> PiecewisePolynomial:
     """A random periodic motion (m) with harmonics of a random beat, growing smoothly from rest."""
     time = np.arange(0.0, DURATION + _KNOT / 2, _KNOT)
@@ -115,9 +182,7 @@ def peak_disturbance(heart: PiecewisePolynomial, velocity_gain: float) -> float:
     return float(np.abs(d).max())
 
 
-def _loop(
-    certificate: StabilityCertificate, scenario: Scenario, design: RSTDesign
-) -> AxisLoop:
+def _loop(certificate: StabilityCertificate, scenario: Scenario, design: RSTDesign) -> AxisLoop:
     timing, plant = certificate.timing, design.specification.plant
     period = to_float(timing.period) if isinstance(timing, Sampling) else None
     step = build_step(

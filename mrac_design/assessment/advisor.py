@@ -27,7 +27,7 @@ from mrac_design.controller.robust import GainBox, WithProjection
 from mrac_design.design import RSTDesign
 from mrac_design.errors import ParameterError
 from mrac_design.simulation.scenario import Scenario
-from mrac_design.simulation.single_axis import build_axis_loop, build_sampled_axis_loop
+from mrac_design.simulation.single_axis import build_sampled_axis_loop
 from mrac_design.stability import ParameterBox, Sampling
 from mrac_design.stability.rational_function import to_float
 from mrac_design.time_domain import Continuous, Discrete
@@ -85,6 +85,8 @@ class GainAdvice:
     """The adaptation law advised on."""
     chosen: float
     """γ̂ of the scenario."""
+    speed: float
+    """λ (1/s) of that γ̂ at the largest force."""
     bounds: tuple[GainBound, ...]
     """Every bound."""
     drift: FloatArray
@@ -134,6 +136,12 @@ def advise_gain(
     return GainAdvice(
         law=scenario.adaptation.law,
         chosen=scenario.adaptation.gain,
+        speed=adaptation_speed(
+            design,
+            scenario.adaptation,
+            gain=scenario.adaptation.gain,
+            force=requirements.largest_force,
+        ),
         bounds=(
             _delay_bound(scenario, design, requirements),
             *step,
@@ -186,8 +194,9 @@ def _delay_bound(scenario: Scenario, design: RSTDesign, needs: Requirements) -> 
         for name, speed in (("frozen", 0.0), ("fast", math.inf))
     }
     speed = largest_stable_speed(
-        lambda rate: AdaptationLoop(design=design, speed=rate).margins().delay_margin
-        >= needs.dead_time
+        lambda rate: (
+            AdaptationLoop(design=design, speed=rate).margins().delay_margin >= needs.dead_time
+        )
     )
     return GainBound(
         source="delay margin",
@@ -217,8 +226,9 @@ def _noise_bound(scenario: Scenario, design: RSTDesign, needs: Requirements) -> 
     fast = AdaptationLoop(design=design, speed=math.inf).noise_gain()
     density = math.sqrt(2 * needs.noise_period) * needs.noise_rms
     speed = largest_stable_speed(
-        lambda rate: AdaptationLoop(design=design, speed=rate).noise_gain()
-        <= needs.noise_growth * frozen
+        lambda rate: (
+            AdaptationLoop(design=design, speed=rate).noise_gain() <= needs.noise_growth * frozen
+        )
     )
     return GainBound(
         source="sensor noise",
@@ -262,19 +272,6 @@ def sampled_growth(
         stiffness=design.specification.plant.stiffness,
         period=period,
         delay=timing.delay,
-    )
-    return linearise_axis(loop, force=force).growth
-
-
-def continuous_growth(
-    scenario: Scenario, design: RSTDesign, *, gain: float, force: float
-) -> float:
-    """Growth (1/s) of the slowest mode of the continuous loop at a constant force (N)."""
-    plant = design.specification.plant
-    loop = build_axis_loop(
-        build_step(axis_controller(scenario, design, gain=gain, sampling_period=None)),
-        velocity_gain=plant.velocity_gain,
-        stiffness=plant.stiffness,
     )
     return linearise_axis(loop, force=force).growth
 
@@ -340,10 +337,3 @@ def _up_to(speed: float) -> str:
 
 def _shown(value: float) -> str:
     return "no limit" if math.isinf(value) else f"{value:.3g}"
-
-
-def speed_of(scenario: Scenario, design: RSTDesign, needs: Requirements) -> float:
-    """λ (1/s) of the scenario's own γ̂ at the largest force."""
-    return adaptation_speed(
-        design, scenario.adaptation, gain=scenario.adaptation.gain, force=needs.largest_force
-    )

@@ -132,18 +132,23 @@ def available_choices() -> tuple[str, ...]:
     return tuple(sorted(path.stem for path in (models_directory() / "stability").glob("*.toml")))
 
 
+def choices_path(name_or_path: str | Path) -> Path:
+    """The file behind a packaged name or a path; raises ScenarioFileError when there is none."""
+    path = Path(name_or_path)
+    if isinstance(name_or_path, str) and name_or_path in available_choices():
+        return models_directory() / "stability" / f"{name_or_path}.toml"
+    if not path.is_file():
+        names = ", ".join(available_choices())
+        raise ScenarioFileError(path, "", f"no such file, nor one of the choices {names}")
+    return path
+
+
 def load_choices(name_or_path: str | Path) -> StabilityChoices:
     """Choices of a packaged name or of a TOML file's path.
 
     Raises ScenarioFileError, naming file and key, for anything missing, misspelt or out of range.
     """
-    path = Path(name_or_path)
-    if isinstance(name_or_path, str) and name_or_path in available_choices():
-        path = models_directory() / "stability" / f"{name_or_path}.toml"
-    elif not path.exists():
-        names = ", ".join(available_choices())
-        raise ScenarioFileError(path, "", f"no such file, nor one of the choices {names}")
-    root = read_table(path, ScenarioFileError)
+    root = read_table(choices_path(name_or_path), ScenarioFileError)
     root.only(
         "name", "tissue", "continuous", "sampled", "map", "mismatch", "hostile", "advice",
         "excitation",

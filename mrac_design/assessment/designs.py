@@ -7,9 +7,9 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from mrac_design.assessment.advisor import axis_controller, with_bandwidth
 from mrac_design.assessment.choices import StabilityChoices
 from mrac_design.assessment.linearisation import certificate_gap
-from mrac_design.assessment.advisor import axis_controller, with_bandwidth
 from mrac_design.controller.adaptive import build_step
 from mrac_design.design import RSTDesign
 from mrac_design.errors import ParameterError
@@ -44,6 +44,8 @@ class CertifiedDesign:
     """The controller."""
     certificate: StabilityCertificate
     """The proof, or why there is none."""
+    share: float
+    """How far the feedback gains may leave nominal in the certified box, relative."""
     gap: float
     """Largest relative difference between the certificate's matrices and the code that runs."""
 
@@ -163,13 +165,13 @@ def _certified(
         scenario=scenario,
         design=design,
         certificate=certificate,
+        share=box,
         gap=_gap(scenario, design, certificate),
     )
 
 
 def _gap(scenario: Scenario, design: RSTDesign, certificate: StabilityCertificate) -> float:
     plant, timing = design.specification.plant, certificate.timing
-    sampled = isinstance(timing, Sampling)
     period = to_float(timing.period) if isinstance(timing, Sampling) else None
     step = build_step(
         axis_controller(
@@ -179,10 +181,16 @@ def _gap(scenario: Scenario, design: RSTDesign, certificate: StabilityCertificat
             sampling_period=period,
         )
     )
-    given = {"velocity_gain": plant.velocity_gain, "stiffness": plant.stiffness}
+    K2, Ks = plant.velocity_gain, plant.stiffness
     loop = (
-        build_sampled_axis_loop(step, **given, period=period, delay=timing.delay)
-        if sampled
-        else build_axis_loop(step, **given)
+        build_sampled_axis_loop(
+            step,
+            velocity_gain=K2,
+            stiffness=Ks,
+            period=to_float(timing.period),
+            delay=timing.delay,
+        )
+        if isinstance(timing, Sampling)
+        else build_axis_loop(step, velocity_gain=K2, stiffness=Ks)
     )
     return certificate_gap(certificate, loop)

@@ -112,7 +112,9 @@ def _plant_hypotheses(study: StudyRecord) -> tuple[Hypothesis, ...]:
         ),
         decided("A and B coprime", common == 0, f"common factor of degree {common}"),
         decided(
-            "minimum phase", G.numerator.degree() <= 0, f"{G.numerator.degree()} zeros, none to fear"
+            "minimum phase",
+            G.numerator.degree() <= 0,
+            f"{G.numerator.degree()} zeros, none to fear",
         ),
         decided("sign of b0", true > 0, f"b0 = Ks = {true:g} N/m in this scenario, > 0"),
         Hypothesis(
@@ -260,9 +262,7 @@ def _robot_hypotheses(
     )
 
 
-def _inexact(
-    certificate: StabilityCertificate, mismatch: InertiaMismatch, friction: float
-) -> str:
+def _inexact(certificate: StabilityCertificate, mismatch: InertiaMismatch, friction: float) -> str:
     text = (
         f"inertia mismatch up to {100 * mismatch.largest:.3g} % on {len(mismatch.norms)} postures; "
         f"the certificate tolerates {100 * certificate.tolerated_mismatch:.3g} %"

@@ -100,9 +100,7 @@ def inertia_mismatch(
     )
 
 
-def posture_grid(
-    robot: RobotDescription, *, slide: float, turn: float, points: int
-) -> FloatArray:
+def posture_grid(robot: RobotDescription, *, slide: float, turn: float, points: int) -> FloatArray:
     """A full grid around the home posture, (points ** n, n).
 
     Prismatic joints within ±`slide` (m), revolute ones within ±`turn` (rad), `points` values each.

@@ -1,4 +1,4 @@
-"""The advisor's predictions beside simulation: just inside a limit the loop calms, just outside not.
+"""The advisor's predictions beside simulation: calm just inside a limit, growing just outside.
 
 Every limit predicted from the linearised loop is tried in the nonlinear simulation on both sides.
 A kick of a micrometre starts it; its growth is measured between two windows of the run.
@@ -55,6 +55,8 @@ class Prediction:
     """What is limited."""
     unit: str
     """Unit of the limit."""
+    speed: float
+    """Adaptation speed λ (1/s) at the limit; 0 for the frozen controller."""
     predicted: float
     """The limit from the linearised loop."""
     inside: float
@@ -92,6 +94,7 @@ def delay_prediction(
     return Prediction(
         name=name,
         unit="s",
+        speed=speed,
         predicted=predicted,
         inside=inside,
         inside_growth=growths[0],
@@ -119,7 +122,12 @@ def step_prediction(scenario: Scenario, design: RSTDesign, needs: Requirements) 
         )
 
     return _gain_prediction(
-        "γ̂ with this integration step", predicted, loop, force, needs.integration_step
+        "γ̂ with this integration step",
+        RK4_REAL_LIMIT / needs.integration_step,
+        predicted,
+        loop,
+        force,
+        needs.integration_step,
     )
 
 
@@ -138,6 +146,7 @@ def sampled_prediction(
     period = to_float(timing.period)
     return _gain_prediction(
         f"γ̂ at {1 / period:g} Hz, delay {timing.delay}",
+        speed,
         gain(speed),
         lambda value: _sampled_loop(
             gradient, design, gain=value, period=period, delay=timing.delay
@@ -167,9 +176,7 @@ def noise_prediction(
     gain = gain_for_speed(design, gradient.adaptation, speed=speed, force=force)
     plant = design.specification.plant
     step = build_step(axis_controller(gradient, design, gain=gain, sampling_period=None))
-    loop = build_axis_loop(
-        step, velocity_gain=plant.velocity_gain, stiffness=plant.stiffness
-    )
+    loop = build_axis_loop(step, velocity_gain=plant.velocity_gain, stiffness=plant.stiffness)
     inputs = axis_inputs(
         step,
         heart=constant(0.0, duration),
@@ -221,12 +228,18 @@ def constant(value: float, end: float) -> PiecewisePolynomial:
 
 
 def _gain_prediction(
-    name: str, predicted: float, loop: Callable[[float], AxisLoop], force: float, step: float
+    name: str,
+    speed: float,
+    predicted: float,
+    loop: Callable[[float], AxisLoop],
+    force: float,
+    step: float,
 ) -> Prediction:
     inside, outside = 0.95 * predicted, 1.05 * predicted
     return Prediction(
         name=name,
         unit="1/N²",
+        speed=speed,
         predicted=predicted,
         inside=inside,
         inside_growth=measured_growth(loop(inside), force, step=step),
@@ -250,7 +263,7 @@ def _sampled_loop(
 
 def _with_gradient_law(scenario: Scenario) -> Scenario:
     """The plain law: its speed has no ceiling, so that every limit can be reached."""
-    return replace(scenario, adaptation=replace(scenario.adaptation, law="gradient"))
+    return replace(scenario, adaptation=replace(scenario.adaptation, law="gradient", safeguards=()))
 
 
 def _kick() -> PiecewisePolynomial:

@@ -1,4 +1,4 @@
-r"""The signals of the adaptation rebuilt from a recorded run: regressor, augmented error, excitation.
+r"""What the adaptation of a recorded run saw: regressor, augmented error, excitation.
 
 Force, command and model output are recorded; the filters 1/Ao and 1/Am applied to them once more
 give the regressor φ̂ = b0 D φ of every axis, and with it

@@ -112,8 +112,8 @@ def worst_cases(
     box = _points(certificate, rng)
     loops = _spans(certificate, box)
     scale = _state_scale(certificate)
-    metric = np.linalg.inv(scale[:, None] * to_floats(peak.P) * scale)
-    found = [path for path in _paths(loops, metric, paths, spans, rng)]
+    metric: FloatArray = np.linalg.inv(scale[:, None] * to_floats(peak.P) * scale)
+    found = list(_paths(loops, metric, paths, spans, rng))
     peaks = [_worst_peak(loops, path) for path in found]
     energies = [_worst_energy(loops, path) for path in found]
     lyapunov = scale[:, None] * to_floats(decay.P) * scale
@@ -316,7 +316,10 @@ def _worst_energy(loops: _Spans, path: NDArray[np.int_]) -> float:
     response = np.zeros((n, len(path) * SUBSTEPS))
     lifted = np.zeros((len(path) * len(parts), len(path) * SUBSTEPS))
     for k, point in enumerate(path):
-        at, own = slice(k * len(parts), (k + 1) * len(parts)), slice(k * SUBSTEPS, (k + 1) * SUBSTEPS)
+        at, own = (
+            slice(k * len(parts), (k + 1) * len(parts)),
+            slice(k * SUBSTEPS, (k + 1) * SUBSTEPS),
+        )
         lifted[at] = loops.rows[point][parts] @ response
         lifted[at, own] += loops.direct[point][parts]
         response = loops.transition[point] @ response
@@ -324,7 +327,7 @@ def _worst_energy(loops: _Spans, path: NDArray[np.int_]) -> float:
     # Sampled: the force counts with a whole period, the disturbance with the part it acts in.
     share = SUBSTEPS if loops.sampled else 1
     # Power iteration: after any number of steps a ratio that a disturbance really reaches.
-    disturbance = np.ones(lifted.shape[1])
+    disturbance: FloatArray = np.ones(lifted.shape[1])
     gain = 0.0
     for _ in range(POWER_STEPS):
         disturbance /= np.linalg.norm(disturbance)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import os
 import re
+import shlex
 import shutil
 import subprocess
 import tempfile
@@ -38,6 +39,7 @@ def measure_step(package: Path, *, operations: int, steps: int) -> StepCosts:
     compiler, valgrind = find_compiler(), shutil.which("valgrind")
     if compiler is None:
         return _unmeasured(operations, "no C compiler was found at export")
+    command = shlex.split(compiler)
     with tempfile.TemporaryDirectory(prefix="mrac-count-") as scratch:
         folder = Path(scratch)
         program = folder / "selftest"
@@ -46,14 +48,14 @@ def measure_step(package: Path, *, operations: int, steps: int) -> StepCosts:
         unit = str(folder / "controller.o")
         # Not every compiler knows how to tell the stack; all know how to do without.
         compiled = any(
-            _run([compiler, *flags, *more, "-c", part, "-o", unit], folder) is not None
+            _run([*command, *flags, *more, "-c", part, "-o", unit], folder) is not None
             for more in (["-fstack-usage"], [])
         )
-        linked = [compiler, *flags, main, unit, "-o", str(program), "-lm"]
+        linked = [*command, *flags, main, unit, "-o", str(program), "-lm"]
         if not compiled or _run(linked, folder) is None:
             return _unmeasured(operations, f"{compiler} could not compile it at export")
         stack = _stack_bytes(folder)
-        version = (_run([compiler, "--version"], folder) or "").partition("\n")[0]
+        version = (_run([*command, "--version"], folder) or "").partition("\n")[0]
         if valgrind is None:
             return StepCosts(
                 operations=operations,

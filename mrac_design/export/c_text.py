@@ -148,6 +148,8 @@ def _declarations(step: RobotStep) -> dict[str, str]:
 def _members(layout: Layout, axes: Sequence[str]) -> str:
     lines = []
     for name, length in layout.blocks:
+        if length == 0:  # ISO C knows no array of length zero
+            continue
         declaration = f"    mrac_real {name}{'' if length == 1 else f'[{length}]'};"
         meaning = _MEANINGS.get(_without_axis(name, axes))
         lines.append(declaration if meaning is None else f"{declaration} /* {meaning} */")
@@ -203,6 +205,8 @@ def _indented(statements: Sequence[str]) -> str:
 def _initialisers(layout: Layout, values: FloatArray, number: RealType) -> str:
     lines = []
     for name, part in layout.split(np.asarray(values)).items():
+        if part.size == 0:
+            continue
         text = _list(part, number)
         lines.append(f"    .{name} = {text if part.size == 1 else f'{{{text}}}'},")
     return "\n".join(lines)

@@ -11,6 +11,7 @@ from __future__ import annotations
 import hashlib
 import json
 import platform
+import shlex
 import subprocess
 import sys
 import zipfile
@@ -179,7 +180,7 @@ def _platform() -> tuple[str, str] | None:
 def _compiled(source: str, folder: Path, compiler: str, suffix: str) -> bytes:
     file, library = folder / _SOURCE, folder / f"{MODEL_IDENTIFIER}{suffix}"
     file.write_text(source, encoding="utf-8")
-    command = [compiler, *_FLAGS, str(file), "-o", str(library), "-lm"]
+    command = [*shlex.split(compiler), *_FLAGS, str(file), "-o", str(library), "-lm"]
     result = subprocess.run(command, capture_output=True, text=True, check=False)
     if result.returncode != 0:
         raise CompilationError(command, result.stderr)

@@ -11,7 +11,7 @@ from matplotlib.lines import Line2D
 
 from mrac_design.arrays import FloatArray
 from mrac_design.publishing import publish_file, staging_folder
-from mrac_design.realtime import RealtimeRecord, RealtimeReport
+from mrac_design.realtime import RealtimeRecord, RealtimeReport, RealtimeRun
 from mrac_design.report.style import (
     COLOURS,
     SERIES_COLOURS,
@@ -71,7 +71,7 @@ def save_latency_figure(report: RealtimeReport, directory: Path) -> tuple[Path, 
     return tuple(directory / name for name in names)
 
 
-def _coloured(report: RealtimeReport) -> list[tuple]:
+def _coloured(report: RealtimeReport) -> list[tuple[RealtimeRun, str]]:
     return [(run, SERIES_COLOURS[i % len(SERIES_COLOURS)]) for i, run in enumerate(report.runs)]
 
 

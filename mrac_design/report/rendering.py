@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from datetime import date
 from pathlib import Path
 
@@ -37,21 +37,24 @@ def render_report(
     scenario: Path,
     html: Path,
     pdf: Path,
+    environment: Mapping[str, str] | None = None,
     progress: ReportProgress = ignore_progress,
 ) -> None:
     """Execute `notebooks` and write them, in order, as chapters of `html` and `pdf`.
 
     The notebooks find the path of the `scenario` file in the environment variable
-    MRAC_SCENARIO. Both files are complete when they appear; when anything fails, or the run
-    is interrupted, neither is touched. Raises NotebookError for a missing or failing
-    notebook, RenderingError when Pandoc or Typst refuses the document.
+    MRAC_SCENARIO, and what else they are told in the variables of `environment`. Both files
+    are complete when they appear; when anything fails, or the run is interrupted, neither is
+    touched. Raises NotebookError for a missing or failing notebook, RenderingError when Pandoc
+    or Typst refuses the document.
     """
     missing = [path for path in notebooks if not path.is_file()]
     if missing:
         raise NotebookError(missing[0], "", "no such notebook")
+    variables = {"MRAC_SCENARIO": str(scenario.absolute()), **(environment or {})}
     with staging_folder(html) as folder:
         source = folder / "report.md"
-        source.write_text(_executed_markdown(notebooks, scenario, folder, progress), "utf-8")
+        source.write_text(_executed_markdown(notebooks, variables, folder, progress), "utf-8")
         metadata = _metadata(title, subtitle)
         progress("writing HTML", _EXECUTION_SHARE)
         page = _write_html(source, metadata)
@@ -67,12 +70,15 @@ def render_report(
 
 
 def _executed_markdown(
-    notebooks: Sequence[Path], scenario: Path, folder: Path, progress: ReportProgress
+    notebooks: Sequence[Path],
+    environment: Mapping[str, str],
+    folder: Path,
+    progress: ReportProgress,
 ) -> str:
     executed = execute_notebooks(
         notebooks,
         folder,
-        {"MRAC_SCENARIO": str(scenario.absolute())},
+        environment,
         lambda name, done: progress(f"running {name}", _EXECUTION_SHARE * done),
     )
     chapters = [

@@ -11,7 +11,7 @@ from typing import Any
 
 from mrac_design.export.gains import gains_document
 from mrac_design.export.values import study_values
-from mrac_design.publishing import publish_file, publish_folder, staging_folder
+from mrac_design.publishing import publish_contents, staging_folder
 from mrac_design.report.rendering import ReportProgress, ignore_progress, render_report
 from mrac_design.report.saving import save_figures
 from mrac_design.resources import notebooks_directory
@@ -33,7 +33,7 @@ def write_study_report(
     of it appears in `out` before all of it is finished; other files there are left alone. Raises
     what `run_study` and `render_report` raise.
     """
-    scenario = _with_absolute_paths(scenario)
+    scenario = with_absolute_paths(scenario)
     study = run_study(
         scenario, progress=lambda done: progress("simulating", _SIMULATION_SHARE * done)
     )
@@ -53,13 +53,11 @@ def write_study_report(
             pdf=folder / "report.pdf",
             progress=_after(progress, _SIMULATION_SHARE + _FIGURES_SHARE),
         )
-        for finished in sorted(folder.iterdir()):
-            publish = publish_folder if finished.is_dir() else publish_file
-            publish(finished, out / finished.name)
+        publish_contents(folder, out)
     return study
 
 
-def _with_absolute_paths(scenario: Scenario) -> Scenario:
+def with_absolute_paths(scenario: Scenario) -> Scenario:
     """Paths that work from anywhere: the notebooks run in a folder of their own."""
 
     def absolute(name_or_path: str) -> str:

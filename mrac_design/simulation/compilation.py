@@ -26,6 +26,8 @@ _FLAGS = (
     "-fno-math-errno", "-fno-trapping-math", "-fPIC", "-shared",
 )  # fmt: skip
 _X86_FLAGS = ("-mprefer-vector-width=512",)
+# What gcc leaves out on x86 and clang does anyway: a fifth faster on straight-line code.
+_GCC_FLAGS = ("-fschedule-insns", "-fsched-pressure")
 _TIME_LIMIT = 600.0
 """Seconds after which a compiler is given up."""
 
@@ -51,8 +53,13 @@ def compile_library(source: str, compiler: str) -> ctypes.CDLL:
     when it refuses the source, and when there is no folder to write to.
     """
     command = shlex.split(compiler)
-    flags = (*_FLAGS, *(_X86_FLAGS if platform.machine() in ("x86_64", "AMD64") else ()))
-    key = "\n".join((source, " ".join(flags), compiler, _version(compiler), _processor()))
+    compiler_version = _version(compiler)
+    flags: tuple[str, ...] = _FLAGS
+    if platform.machine() in ("x86_64", "AMD64"):
+        flags += _X86_FLAGS
+    if "clang" not in compiler_version.lower():
+        flags += _GCC_FLAGS
+    key = "\n".join((source, " ".join(flags), compiler, compiler_version, _processor()))
     name = f"{hashlib.sha256(key.encode()).hexdigest()[:32]}.so"
     obstacles = []
     for find_directory in (_user_cache, _private_directory):

@@ -188,5 +188,5 @@ def retreating(heart: PiecewisePolynomial, retreat: StepSequence) -> PiecewisePo
     steps = retreat.piecewise(heart.end)
     both = stack(heart, steps)  # on common breakpoints
     coefficients = both.coefficients[: heart.channels].copy()
-    coefficients[:, :, 0] -= both.coefficients[heart.channels, :, 0]
+    coefficients[:, :, 0] += both.coefficients[heart.channels, :, 0]
     return PiecewisePolynomial(breakpoints=both.breakpoints, coefficients=coefficients)

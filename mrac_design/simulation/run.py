@@ -85,9 +85,10 @@ def run(
         _require_finite(rows, time, state)
         if progress is not None:
             progress(last / schedule.length.size)
-    return Recording(
-        time=readonly(time), outputs=readonly(np.vstack(rows)), final_state=readonly(state)
-    )
+    # Records are megabytes: no copy of what is already whole.
+    outputs = rows[0] if len(rows) == 1 else np.vstack(rows)
+    outputs.setflags(write=False)
+    return Recording(time=readonly(time), outputs=outputs, final_state=readonly(state))
 
 
 def _require_finite(rows: list[FloatArray], time: FloatArray, state: FloatArray) -> None:

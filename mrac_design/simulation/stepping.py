@@ -8,6 +8,7 @@ from dataclasses import dataclass
 import casadi as ca
 
 from mrac_design.arrays import FloatArray
+from mrac_design.codegen.ordering import ordered
 from mrac_design.codegen.passes import fuse_products, hoist_settled, share_reciprocals
 from mrac_design.codegen.reading import call_program, operations_as_written, read_function
 from mrac_design.codegen.straight_line import Builder, OperationCount, StraightLine
@@ -47,8 +48,8 @@ def prepare(function: ca.Function, *, names: Sequence[str] = ARGUMENTS) -> Prepa
 
 
 def finished(program: StraightLine) -> StraightLine:
-    """A program as the machines run it: sines written out, products fused with sums."""
-    return fuse_products(lower_trigonometry(program))
+    """A program as the machines run it: sines written out, products fused with sums, ordered."""
+    return ordered(fuse_products(lower_trigonometry(program)))
 
 
 def step_program(

@@ -9,6 +9,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from mrac_design.codegen.machine import casadi_function
+from mrac_design.codegen.ordering import ordered
 from mrac_design.codegen.passes import fuse_products, hoist_settled, share_reciprocals
 from mrac_design.codegen.reading import operations_as_written, read_function
 from mrac_design.codegen.straight_line import Builder
@@ -43,6 +44,11 @@ def test_every_pass_keeps_the_value(values, parameters):
         np.testing.assert_allclose(
             evaluated(program, values, parameters), expected, rtol=1e-12, atol=1e-14
         )
+    again = ordered(program)
+    assert again.count() == program.count()
+    assert np.array_equal(
+        evaluated(again, values, parameters), evaluated(program, values, parameters)
+    )
     setup, body = hoist_settled(program, ["p"])
     prepared = casadi_function(setup, "s")(values, parameters)
     joined = casadi_function(body, "b")(values, parameters, prepared).full().ravel()

@@ -10,10 +10,10 @@ from scipy.integrate import solve_ivp
 
 from mrac_design.motion.signal import PiecewisePolynomial
 from mrac_design.simulation.compilation import find_compiler
+from mrac_design.simulation.dormand_prince_8 import DORMAND_PRINCE_8
 from mrac_design.simulation.engine import CompiledEngine, InterpretedEngine, LlvmEngine
 from mrac_design.simulation.method import ErrorControl, TaylorSeries
 from mrac_design.simulation.run import Recording, RunSettings, run
-from mrac_design.simulation.dormand_prince_8 import DORMAND_PRINCE_8
 from mrac_design.simulation.tableau import DORMAND_PRINCE_5, RK4
 from tests.simulation.small_systems import INITIAL_STATE, PARAMETER_VALUES, pendulum, pushes
 

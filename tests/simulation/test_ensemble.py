@@ -18,6 +18,7 @@ from mrac_design.errors import EnsembleError, ParameterError
 from mrac_design.simulation import ensemble as ensemble_module
 from mrac_design.simulation.cluster import DaskCluster
 from mrac_design.simulation.compilation import find_compiler
+from mrac_design.simulation.dormand_prince_8 import DORMAND_PRINCE_8
 from mrac_design.simulation.engine import CompiledEngine
 from mrac_design.simulation.ensemble import (
     LocalThreads,
@@ -29,7 +30,6 @@ from mrac_design.simulation.ensemble import (
 from mrac_design.simulation.lanes import LaneEngine
 from mrac_design.simulation.run import run
 from mrac_design.simulation.store import EnsembleStore
-from mrac_design.simulation.dormand_prince_8 import DORMAND_PRINCE_8
 from mrac_design.simulation.tableau import DORMAND_PRINCE_5, RK4
 from tests.simulation.ensemble_problem import pendulums
 

@@ -47,7 +47,18 @@ local function kept_together(tbl)
   }
 end
 
+-- A column without an alignment of its own stands on the left in both outputs.
+local function flush_left(tbl)
+  for i, column in ipairs(tbl.colspecs) do
+    if column[1] == "AlignDefault" then
+      tbl.colspecs[i] = { "AlignLeft", column[2] }
+    end
+  end
+  return tbl
+end
+
 return {
+  { Table = flush_left },
   {
     traverse = "topdown",
     CodeBlock = cell,
