@@ -30,7 +30,7 @@ from mrac_design.robot import (
 from mrac_design.simulation.compilation import compile_library
 from mrac_design.simulation.stepping import finished
 
-COUNT = 4096
+COUNT = 1024
 """Postures evaluated in a call: few enough to stay in the cache."""
 
 _HARNESS = """\
@@ -38,13 +38,13 @@ _HARNESS = """\
 {support}
 {setup}
 {body}
-/* Evaluates n groups of postures; q, qd, torque are (groups, 5) of lanes, results (groups, 65). */
+/* n groups of postures; q, qd, torque are (groups, 5) of lanes, results (64 / lanes, 65). */
 void evaluate(long n, const real *q, const real *qd, const real *torque, const real *p, real *out)
 {{
     real prepared[{prepared} + 1];
     setup(p, prepared);
     for (long i = 0; i < n; ++i) {{
-        real *o = out + (size_t)(i % 64) * 65;
+        real *o = out + (size_t)(i % (64 / LANES)) * 65;
         terms(q + 5 * i, qd + 5 * i, torque + 5 * i, p, prepared, o, o + 25, o + 30, o + 55,
               o + 60);
     }}
@@ -102,7 +102,7 @@ def rigid_body_terms(compiler: str, *, rounds: int, say) -> list[Result]:
     q = robot.home + generator.uniform(-0.3, 0.3, (COUNT, 5))
     qd, torque = generator.normal(size=(2, COUNT, 5))
     truth = _truth(dynamics, q[:64], qd[:64], torque[:64])
-    _say_counts(dynamics, say)
+    _say_counts(dynamics, compiler, say)
     found = [_ours(dynamics, compiler, lanes, q, qd, torque, truth) for lanes in (8, 1)]
     for make in (_mujoco, _pinocchio, _casadi_map):
         try:
@@ -117,12 +117,35 @@ def rigid_body_terms(compiler: str, *, rounds: int, say) -> list[Result]:
     ]  # fmt: skip
 
 
-def _say_counts(dynamics: RobotDynamics, say) -> None:
+def _say_counts(dynamics: RobotDynamics, compiler: str, say) -> None:
+    """Operation counts, and the time below which two floating-point units cannot go."""
     function = dynamics.rigid_body_terms
     program = share_reciprocals(read_function(function), settled=["parameters"])
     _, body = hoist_settled(program, ["parameters"])
     say(f"rigid-body terms as written: {operations_as_written(function)._repr_markdown_()}")
     say(f"after optimisation: {body.count()._repr_markdown_()}")
+    products = finished(body).count().products
+    clock = _cycles_per_second(compiler)
+    scalar = 1e9 * products / 2 / clock
+    say(
+        f"limit of two multipliers: {products} products, sines written out, many fused with sums, "
+        f"in cycles of {1e9 / clock:.3f} ns: {scalar:.1f} ns scalar, {scalar / 8:.1f} ns on 8 lanes"
+    )
+
+
+def _cycles_per_second(compiler: str) -> float:
+    """Clock under load, from a loop of one dependent addition a cycle."""
+    source = """
+    long count(long n) {
+        long x = 0;
+        for (long i = 0; i < n; ++i) { x += i; __asm__ volatile("" : "+r"(x)); }
+        return x;
+    }
+    """
+    library = compile_library(source, compiler)
+    n = 20_000_000
+    seconds = interleaved({"it": lambda: library.count(ctypes.c_long(n))}, rounds=5)["it"]
+    return n / seconds
 
 
 def _truth(dynamics: RobotDynamics, q, qd, torque) -> dict[str, np.ndarray]:
@@ -161,11 +184,11 @@ def _ours(dynamics, compiler, lanes, q, qd, torque, truth) -> _Evaluator:
     arrays = [_in_lanes(values, lanes) for values in (q, qd, torque)]
     parameters = inertial_parameters(dynamics.description)
     wide = _in_lanes(np.repeat(parameters[None, :], lanes, axis=0), lanes)
-    out = _in_lanes(np.zeros((64 * lanes, 65)), lanes)
+    out = _in_lanes(np.zeros((64, 65)), lanes)
     pointers = [a.ctypes.data_as(ctypes.c_void_p) for a in (*arrays, wide, out)]
     groups = COUNT // lanes
-    evaluate(ctypes.c_long(64 if lanes == 1 else 64 // lanes), *pointers)
-    flat = out.reshape(64, 65, lanes).transpose(0, 2, 1).reshape(-1, 65)[:64]
+    evaluate(ctypes.c_long(64 // lanes), *pointers)
+    flat = out.transpose(0, 2, 1).reshape(64, 65)
     name = f"mrac_design, {lanes} lanes" if lanes > 1 else "mrac_design, scalar"
     _check(name, flat, truth)
     return _Evaluator(name, lambda: evaluate(ctypes.c_long(groups), *pointers), COUNT, seconds)

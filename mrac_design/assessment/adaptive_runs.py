@@ -12,6 +12,7 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.interpolate import CubicSpline
 
+from mrac_design.arrays import FloatArray
 from mrac_design.assessment.advisor import axis_controller, projection_box
 from mrac_design.assessment.prediction import constant
 from mrac_design.assessment.worst_case import Comparison
@@ -54,37 +55,31 @@ def adaptive_runs(
     rng = np.random.default_rng(seed)
     box = projection_box(certificate.box)
     loop = _loop(certificate, scenario, design)
-    low, high = (
-        to_float(v * certificate.loop.design_stiffness) for v in certificate.box.stiffness_ratio
-    )
+    b0 = certificate.loop.design_stiffness
+    softest, stiffest = (to_float(v * b0) for v in certificate.box.stiffness_ratio)
+    K2 = to_float(certificate.loop.velocity_gain)
+    settings = RunSettings(duration=DURATION, step=1e-4, record_period=5e-4)
     worst, engine = 0.0, None
-    controller = loop.step.parameters
     for number in range(runs):
         heart = random_heart(rng)
         inputs = axis_inputs(
             loop.step, heart=heart, reference=constant(0.0, DURATION), end=DURATION
         )
-        start = rng.uniform(box.lower, box.upper)
-        values = controller.split(np.array(loop.step.parameter_values))
-        own = controller.pack(
-            values
-            | {
-                "adaptation_gain": gains[number % len(gains)],
-                "initial_gains": [*start, *values["initial_gains"][3:]],
-            }
-        )
-        parts = loop.system.parameters.split(np.array(loop.with_controller_parameters(own)))
-        parameters = loop.system.parameters.pack({**parts, "stiffness": rng.uniform(low, high)})
         engine = engine or build_axis_engine(loop, inputs)
         trajectory = simulate_axis(
             loop,
             inputs=inputs,
-            settings=RunSettings(duration=DURATION, step=1e-4, record_period=5e-4),
-            parameters=parameters,
+            settings=settings,
+            parameters=_started_at(
+                loop,
+                gain=gains[number % len(gains)],
+                start=rng.uniform(box.lower, box.upper),
+                stiffness=float(rng.uniform(softest, stiffest)),
+            ),
             engine=engine,
         )
         peak = float(np.abs(trajectory["force"]).max())
-        worst = max(worst, peak / peak_disturbance(heart, to_float(certificate.loop.velocity_gain)))
+        worst = max(worst, peak / peak_disturbance(heart, K2))
     return Comparison(
         name="peak force per peak of $d$, the law's own gains",
         unit="N/(m/s²)",
@@ -92,6 +87,16 @@ def adaptive_runs(
         simulated=worst,
         trials=runs,
     )
+
+
+def _started_at(loop: AxisLoop, *, gain: float, start: FloatArray, stiffness: float) -> FloatArray:
+    """Parameters with another γ̂, other feedback gains at the start and another tissue."""
+    layout = loop.step.parameters
+    values = layout.split(np.array(loop.step.parameter_values))
+    first = [*start, *values["initial_gains"][3:]]
+    own = layout.pack({**values, "adaptation_gain": gain, "initial_gains": first})
+    parts = loop.system.parameters.split(np.array(loop.with_controller_parameters(own)))
+    return loop.system.parameters.pack({**parts, "stiffness": stiffness})
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

@@ -10,6 +10,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
+from flint import fmpq_poly
 
 from mrac_design.assessment.mismatch import InertiaMismatch
 from mrac_design.assessment.signals import (
@@ -19,6 +20,8 @@ from mrac_design.assessment.signals import (
     excitation,
     rms,
 )
+from mrac_design.polynomials.rationals import decimal_rational
+from mrac_design.polynomials.stable import is_hurwitz
 from mrac_design.simulation.trajectory import Trajectory
 from mrac_design.stability import (
     Hypothesis,
@@ -111,11 +114,7 @@ def _plant_hypotheses(study: StudyRecord) -> tuple[Hypothesis, ...]:
             f"{G.relative_degree}, the 2 that R, S, T and the filters are made for",
         ),
         decided("A and B coprime", common == 0, f"common factor of degree {common}"),
-        decided(
-            "minimum phase",
-            G.numerator.degree() <= 0,
-            f"{G.numerator.degree()} zeros, none to fear",
-        ),
+        decided("minimum phase", G.numerator.degree() <= 0, "the plant has no zeros"),
         decided("sign of b0", true > 0, f"b0 = Ks = {true:g} N/m in this scenario, > 0"),
         Hypothesis(
             name="b0 known",
@@ -125,7 +124,7 @@ def _plant_hypotheses(study: StudyRecord) -> tuple[Hypothesis, ...]:
                 + ("; nothing enforces it on real tissue" if known else "")
             ),
         ),
-        decided("Ao and Am stable", True, _stable_polynomials(study)),
+        _stable_polynomials(study),
         decided(
             "error model strictly positive real",
             error_model.verdict is Verdict.PROVED,
@@ -263,9 +262,11 @@ def _robot_hypotheses(
 
 
 def _inexact(certificate: StabilityCertificate, mismatch: InertiaMismatch, friction: float) -> str:
+    covered = mismatch.largest <= certificate.tolerated_mismatch
     text = (
         f"inertia mismatch up to {100 * mismatch.largest:.3g} % on {len(mismatch.norms)} postures; "
-        f"the certificate tolerates {100 * certificate.tolerated_mismatch:.3g} %"
+        f"the certificate tolerates {100 * certificate.tolerated_mismatch:.3g} %, "
+        f"{'enough' if covered else 'too little'}"
     )
     return text + (f"; friction {friction:g} times the robot file's" if friction else "")
 
@@ -305,12 +306,15 @@ def _measurement(study: StudyRecord) -> Hypothesis:
     )
 
 
-def _stable_polynomials(study: StudyRecord) -> str:
+def _stable_polynomials(study: StudyRecord) -> Hypothesis:
     specification = study.design.specification
     model = specification.reference_model
-    return (
-        f"ao = {specification.observer_pole:g} > 0; ω = {model.bandwidth:g} and "
-        f"ξ = {model.damping:g} > 0"
+    Ao = fmpq_poly([decimal_rational(specification.observer_pole), 1])
+    return decided(
+        "Ao and Am stable",
+        is_hurwitz(Ao * model.exact_polynomial),
+        f"Ao = p + {specification.observer_pole:g}; Am with ω = {model.bandwidth:g} rad/s, "
+        f"ξ = {model.damping:g}",
     )
 
 

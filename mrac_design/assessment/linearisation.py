@@ -9,6 +9,7 @@ goes on with the new command. With x the plant's state and z the memory before t
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import lru_cache
 
 import casadi as ca
 import numpy as np
@@ -128,13 +129,19 @@ def certificate_gap(certificate: StabilityCertificate, loop: AxisLoop) -> float:
     return worst
 
 
-def _derivatives(
-    function: ca.Function, x: FloatArray, z: FloatArray, v: FloatArray, p: FloatArray
-) -> tuple[FloatArray, FloatArray]:
+@lru_cache(maxsize=8)
+def _jacobians(function: ca.Function) -> ca.Function:
+    """Derivatives of a function to its first two arguments; kept, for a scan asks many times."""
     arguments = [function.sx_in(i) for i in range(4)]
     result = function(*arguments)
     jacobians = [ca.densify(ca.jacobian(result, arguments[i])) for i in (0, 1)]
-    first, second = ca.Function("derivatives", arguments, jacobians)(x, z, v, p)
+    return ca.Function("derivatives", arguments, jacobians)
+
+
+def _derivatives(
+    function: ca.Function, x: FloatArray, z: FloatArray, v: FloatArray, p: FloatArray
+) -> tuple[FloatArray, FloatArray]:
+    first, second = _jacobians(function)(x, z, v, p)
     return first.full(), second.full()
 
 

@@ -18,8 +18,7 @@ from mrac_design.assessment.advisor import (
     RK4_REAL_LIMIT,
     Requirements,
     axis_controller,
-    largest_stable_speed,
-    sampled_growth,
+    largest_sampled_speed,
 )
 from mrac_design.controller.adaptive import build_step
 from mrac_design.design import RSTDesign
@@ -137,17 +136,12 @@ def sampled_prediction(
     """Largest γ̂ of the plain gradient law in the sampled controller's own code."""
     gradient, force = _with_gradient_law(scenario), needs.largest_force
 
-    def gain(speed: float) -> float:
-        return gain_for_speed(design, gradient.adaptation, speed=speed, force=force)
-
-    speed = largest_stable_speed(
-        lambda rate: sampled_growth(gradient, design, timing, gain=gain(rate), force=force) < 0
-    )
+    speed = largest_sampled_speed(gradient, design, timing, force=force)
     period = to_float(timing.period)
     return _gain_prediction(
         f"γ̂ at {1 / period:g} Hz, delay {timing.delay}",
         speed,
-        gain(speed),
+        gain_for_speed(design, gradient.adaptation, speed=speed, force=force),
         lambda value: _sampled_loop(
             gradient, design, gain=value, period=period, delay=timing.delay
         ),

@@ -16,7 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.linalg import expm
 
-from mrac_design.arrays import FloatArray
+from mrac_design.arrays import FloatArray, readonly
 from mrac_design.errors import ParameterError
 from mrac_design.stability import Sampling, StabilityCertificate
 from mrac_design.stability.exact_matrix import to_floats
@@ -112,7 +112,7 @@ def worst_cases(
     box = _points(certificate, rng)
     loops = _spans(certificate, box)
     scale = _state_scale(certificate)
-    metric: FloatArray = np.linalg.inv(scale[:, None] * to_floats(peak.P) * scale)
+    metric = readonly(np.linalg.inv(scale[:, None] * to_floats(peak.P) * scale))
     found = list(_paths(loops, metric, paths, spans, rng))
     peaks = [_worst_peak(loops, path) for path in found]
     energies = [_worst_energy(loops, path) for path in found]
@@ -327,13 +327,11 @@ def _worst_energy(loops: _Spans, path: NDArray[np.int_]) -> float:
     # Sampled: the force counts with a whole period, the disturbance with the part it acts in.
     share = SUBSTEPS if loops.sampled else 1
     # Power iteration: after any number of steps a ratio that a disturbance really reaches.
-    disturbance: FloatArray = np.ones(lifted.shape[1])
-    gain = 0.0
+    disturbance, gain = np.ones(lifted.shape[1]), 0.0
     for _ in range(POWER_STEPS):
-        disturbance /= np.linalg.norm(disturbance)
-        force = lifted @ disturbance
+        force = lifted @ (disturbance / np.linalg.norm(disturbance))
         gain = float(np.linalg.norm(force))
-        disturbance = lifted.T @ force
+        disturbance = np.asarray(lifted.T @ force)
     return gain * float(np.sqrt(share))
 
 

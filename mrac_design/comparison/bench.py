@@ -105,7 +105,8 @@ class Bench:
     ) -> FloatArray:
         """Force less desired force (N) at every sample from the condition's settling on, (N,).
 
-        `extra_delay` samples of dead time come on top of the setting's. Raises SimulationError when the loop diverges past the range of numbers.
+        `extra_delay` samples of dead time come on top of the setting's. Raises SimulationError
+        when the loop diverges past the range of numbers.
         """
         step = with_quantised_force(axis.step, sensing.resolution)
         inputs = _inputs(

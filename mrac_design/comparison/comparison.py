@@ -59,8 +59,12 @@ class ComparisonSpecification:
     """Draws of the noise each is judged with."""
     seed: int
     """Seed of the tuner."""
+    taking_part: tuple[str, ...]
+    """Names of the contestants."""
 
     def __post_init__(self) -> None:
+        object.__setattr__(self, "taking_part", tuple(self.taking_part))
+        self.contestants  # noqa: B018  raises for a name nobody has
         if self.axis not in AXES:
             raise ParameterError("axis", self.axis, f"must be one of {', '.join(AXES)}")
         if not 0 < self.stiffness_factor < math.inf:
@@ -68,11 +72,22 @@ class ComparisonSpecification:
         if self.seeds < 2:
             raise ParameterError("seeds", self.seeds, "must be at least 2")
 
+    @property
+    def contestants(self) -> tuple[Contestant, ...]:
+        """The contestants named, in the order of `contestants`."""
+        known = {contestant.name: contestant for contestant in contestants()}
+        for name in self.taking_part:
+            if name not in known:
+                raise ParameterError("contestant", name, f"must be one of {', '.join(known)}")
+        if not self.taking_part:
+            raise ParameterError("contestants", "none", "needs at least one name")
+        return tuple(known[name] for name in known if name in self.taking_part)
+
     def fingerprint(self, contestant: Contestant) -> str:
         """A hash of everything the result of a contestant depends on."""
         source = Path(self.motion.source)
         content = {
-            **specification_values(self),
+            **{n: v for n, v in specification_values(self).items() if n != "taking_part"},
             "recording": hashlib.sha256(source.read_bytes()).hexdigest()
             if source.is_file()
             else "",
@@ -86,11 +101,18 @@ class ComparisonSpecification:
 
 
 def comparison_specification(
-    scenario: Scenario, *, axis: str = "Z", budget: int = BUDGET, seeds: int = SEEDS, seed: int = 0
+    scenario: Scenario,
+    *,
+    axis: str = "Z",
+    budget: int = BUDGET,
+    seeds: int = SEEDS,
+    seed: int = 0,
+    taking_part: Sequence[str] | None = None,
 ) -> ComparisonSpecification:
     """The comparison on one axis of a scenario with a sampled controller and a noisy sensor.
 
-    Raises ParameterError for a scenario in continuous time: noise then means nothing.
+    `taking_part` names contestants; without it all take part. Raises ParameterError for a scenario
+    in continuous time: noise then means nothing.
     """
     sampling = scenario.sampling
     if not isinstance(sampling, SampledMeasurement):
@@ -116,6 +138,7 @@ def comparison_specification(
         budget=budget,
         seeds=seeds,
         seed=seed,
+        taking_part=tuple([c.name for c in contestants()] if taking_part is None else taking_part),
     )
 
 
@@ -132,8 +155,6 @@ class Comparison:
     """What it was."""
     conditions: ConditionSet
     """What contestants were run on."""
-    contestants: tuple[Contestant, ...]
-    """Who took part."""
     entries: Mapping[str, Entry]
     """What is known of each, by name."""
     limits: Mapping[str, LinearLimit]
@@ -141,12 +162,16 @@ class Comparison:
     front: tuple[LinearLimit, ...]
     """The best exchange of motion error against amplification on the first condition."""
 
+    @property
+    def contestants(self) -> tuple[Contestant, ...]:
+        """Who took part."""
+        return self.specification.contestants
+
 
 def run_comparison(
     specification: ComparisonSpecification,
     *,
     store: ComparisonStore,
-    taking_part: Sequence[Contestant] | None = None,
     workers: int | None = None,
     progress: Progress | None = None,
 ) -> Comparison:
@@ -155,7 +180,7 @@ def run_comparison(
     `workers` processes run at a time, one a core unless given. Raises MotionFileError for a
     motion that cannot be used.
     """
-    chosen = contestants() if taking_part is None else tuple(taking_part)
+    chosen = specification.contestants
     prints = {contestant.name: specification.fingerprint(contestant) for contestant in chosen}
     entries: dict[str, Entry] = {}
     missing = []
@@ -172,7 +197,6 @@ def run_comparison(
     return Comparison(
         specification=specification,
         conditions=conditions,
-        contestants=chosen,
         entries={contestant.name: entries[contestant.name] for contestant in chosen},
         limits=_limits(specification, conditions),
         front=_front(specification, conditions),
@@ -251,7 +275,7 @@ def _computed(
                     latest = f"finished {running[future].title}"
                     yield running[future], future.result()
                 if progress is not None:
-                    progress(latest, (done_before + sum(shares)) / total)
+                    progress(latest, (done_before + sum(shares[:])) / total)
         finally:
             pool.shutdown(wait=False, cancel_futures=True)
 
@@ -319,9 +343,7 @@ def load_specification(path: Path) -> ComparisonSpecification:
         content = json.loads(path.read_text(encoding="utf-8"))
         setting = content.pop("setting")
         return ComparisonSpecification(
-            setting=AxisSetting(
-                **{**setting, "prefilter": ReferenceModel(**setting["prefilter"])}
-            ),
+            setting=AxisSetting(**{**setting, "prefilter": ReferenceModel(**setting["prefilter"])}),
             motion=MotionChoice(**content.pop("motion")),
             **content,
         )

@@ -8,7 +8,7 @@ from pathlib import Path
 
 import numpy as np
 
-from mrac_design.arrays import FloatArray
+from mrac_design.arrays import FloatArray, readonly
 from mrac_design.comparison.limit import MotionSpectrum, motion_spectrum
 from mrac_design.comparison.setting import AxisSetting, Condition
 from mrac_design.motion import (
@@ -75,16 +75,12 @@ def condition_set(
         title=f"held back, stiffness × {stiffness_factor:g}",
         stiffness_factor=stiffness_factor,
     )
-    spectrum = motion_spectrum(training.heart, end=_training_end(training), period=setting.period)
+    spectrum = motion_spectrum(training.heart, end=training.duration, period=setting.period)
     random = _random(spectrum, training.beat_period)
     strangers = _strangers(channel)[:stranger_count]
     return ConditionSet(
         training=training, judged=(held_back, stiffer, *strangers, random), spectrum=spectrum
     )
-
-
-def _training_end(training: Condition) -> float:
-    return training.duration
 
 
 def _recorded(motion: MotionChoice, channel: int) -> tuple[Condition, Condition]:
@@ -176,7 +172,7 @@ def _from_model(model: DualFourierModel, channel: int, name: str, title: str) ->
 def _random(spectrum: MotionSpectrum, beat_period: float) -> Condition:
     """A Gaussian motion of the training motion's spectrum, under a constant force: exactly what
     the limit is computed for."""
-    nodes = np.arange(round(MODEL_DURATION / _NODES) + 1) * _NODES
+    nodes = readonly(np.arange(round(MODEL_DURATION / _NODES) + 1) * _NODES)
     value, rate, second = spectrum.realisation(nodes, seed=0)
     return Condition(
         name="random",

@@ -25,7 +25,8 @@ from mrac_design.errors import ParameterError
 from mrac_design.motion.signal import PiecewisePolynomial
 
 MEMORY = 1500
-"""Past readings the best predictor may use: more change the limit by less than a per mille."""
+"""Past readings the best predictor may use: 1.5 s at 1 kHz, more than a beat. Twice as many lower
+the limit by about one per cent."""
 
 ASSUMPTIONS = (
     "The motion is a stationary Gaussian process whose spectrum the controller knows: that of the "
@@ -75,9 +76,7 @@ class MotionSpectrum:
         )
         w = 2.0 * np.pi * self.frequency[used]
         waves = np.exp(1j * np.outer(instants, w))
-        value, rate, second = (
-            np.real(waves @ (factors * (1j * w) ** order)) for order in range(3)
-        )
+        value, rate, second = (np.real(waves @ (factors * (1j * w) ** order)) for order in range(3))
         return value, rate, second
 
 

@@ -47,9 +47,7 @@ FIRST_POLE = TuningParameter(name="$1 - p_1$ of $C$", unit="", low=0.005, high=0
 SECOND_POLE = TuningParameter(name="$1 - p_2$ of $C$", unit="", low=0.005, high=0.95, start=0.5)
 HORIZON = _whole("$N_2$", 4.0, 60.0, 15.0)
 MOVES = TuningParameter(name="$N_u$", unit="", low=1.0, high=6.0, start=3.0)
-PENALTY = TuningParameter(
-    name="$\\lambda$", unit="(N/(m/s²))²", low=1e-10, high=1e-3, start=1e-8
-)
+PENALTY = TuningParameter(name="$\\lambda$", unit="(N/(m/s²))²", low=1e-10, high=1e-3, start=1e-8)
 
 
 def rival_contestants() -> tuple[Contestant, ...]:
@@ -215,9 +213,7 @@ def _horizon(first: int, last: float, moves: float, penalty: float) -> Horizon:
     return Horizon(first=first, last=end, moves=min(round(moves), end), penalty=penalty)
 
 
-def _receding(
-    setting: AxisSetting, values: FloatArray, beat: BeatObserver | None
-) -> TunedAxis:
+def _receding(setting: AxisSetting, values: FloatArray, beat: BeatObserver | None) -> TunedAxis:
     controller = predictive_control(
         PredictiveControl(
             plant=setting.plant,

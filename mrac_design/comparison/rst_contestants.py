@@ -79,7 +79,9 @@ def rst_contestants() -> tuple[Contestant, ...]:
             "RST with integrator",
             (
                 BANDWIDTH,
-                TuningParameter(name="$\\omega_o$", unit="rad/s", low=20.0, high=1000.0, start=100.0),
+                TuningParameter(
+                    name="$\\omega_o$", unit="rad/s", low=20.0, high=1000.0, start=100.0
+                ),
                 TuningParameter(name="$\\xi_o$", unit="", low=0.5, high=2.0, start=0.9),
             ),
             _integral,
