@@ -4,10 +4,13 @@ VENV := .venv
 BIN := $(VENV)/bin
 STAMP := $(VENV)/.installed
 
-.PHONY: report test lint lab bench clean
+.PHONY: report stability test lint lab bench clean
 
 report: $(STAMP)
 	$(BIN)/mrac report --out reports/nominal
+
+stability: $(STAMP)
+	$(BIN)/mrac stability --out reports/stability
 
 test: $(STAMP)
 	$(BIN)/python -m pytest
@@ -22,7 +25,9 @@ lab: $(STAMP)
 	$(BIN)/jupytext --to ipynb --update notebooks/*.py
 	$(BIN)/jupyter lab notebooks
 
+# The peers that are compared with; what does not install is left out of the comparison.
 bench: $(STAMP)
+	-$(BIN)/python -m pip install --quiet --require-hashes --requirement benchmarks/requirements.lock
 	$(BIN)/python -m benchmarks
 
 clean:

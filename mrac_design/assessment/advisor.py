@@ -250,7 +250,7 @@ def _sampled_bound(
         source="sampled loop",
         limit=_limit(scenario, design, needs, speed),
         evidence=(
-            f"poles of the controller's code at {rate:g} Hz with {timing.delay} samples of delay, "
+            f"poles of the controller's code at {rate:g} Hz, delay {timing.delay} in samples, "
             f"adaptation by Euler steps{_up_to(speed)}"
         ),
     )

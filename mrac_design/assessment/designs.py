@@ -119,15 +119,15 @@ def remedies(
     if len(rows):
         best = found.bandwidths[rows].max()
         sentences.append(
-            f"Lower ω from {bandwidth:g} to {best:g} rad/s: at {rate:g} Hz with a delay of "
-            f"{timing.delay} samples {wide} is then certified."
+            f"Lower ω from {bandwidth:g} to {best:g} rad/s: at {rate:g} Hz with "
+            f"{_late(timing)} {wide} is then certified."
         )
     row = int(np.argmin(np.abs(found.bandwidths - bandwidth)))
     for other in np.flatnonzero(reached[row]):
         better = found.samplings[int(other)]
         sentences.append(
-            f"Sample at {1 / to_float(better.period):g} Hz with a delay of {better.delay} samples "
-            f"and keep ω = {found.bandwidths[row]:g} rad/s."
+            f"Sample at {1 / to_float(better.period):g} Hz with {_late(better)} and keep "
+            f"ω = {found.bandwidths[row]:g} rad/s."
         )
     share = found.fractions[row, column]
     if not np.isnan(share) and share > 0:
@@ -136,6 +136,13 @@ def remedies(
         f"Nothing in the map reaches {wide}: narrow the stiffness range, lower ω further, or "
         "sample faster.",
     )
+
+
+def _late(timing: Sampling) -> str:
+    """A delay in words."""
+    if timing.delay == 0:
+        return "no delay"
+    return "a sample of delay" if timing.delay == 1 else f"{timing.delay} samples of delay"
 
 
 def tolerated_mismatches(

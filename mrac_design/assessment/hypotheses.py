@@ -181,9 +181,14 @@ def _excitation(study: StudyRecord, excited: Sequence[Excitation]) -> Hypothesis
         evidence=(
             f"least eigenvalue of the Gram matrix over any {worst.window:g} s is "
             f"{worst.smallest:.2g} N², the greatest {worst.largest:.3g} N² (axis {worst.axis}): "
-            f"the gains would need {time:.2g} s to converge, the run has {duration:g} s"
+            f"the gains would need {_long(time)} to converge, the run has {duration:g} s"
         ),
     )
+
+
+def _long(seconds: float) -> str:
+    """A time in s, or in hours when it is that long."""
+    return f"{seconds:.2g} s" if seconds < 3600 else f"{seconds / 3600:.3g} hours"
 
 
 def _no_disturbance(study: StudyRecord, signals: Sequence[AdaptationSignals]) -> Hypothesis:

@@ -327,11 +327,11 @@ def _worst_energy(loops: _Spans, path: NDArray[np.int_]) -> float:
     # Sampled: the force counts with a whole period, the disturbance with the part it acts in.
     share = SUBSTEPS if loops.sampled else 1
     # Power iteration: after any number of steps a ratio that a disturbance really reaches.
-    disturbance, gain = np.ones(lifted.shape[1]), 0.0
+    gain, disturbance = 0.0, np.ones(lifted.shape[1])
     for _ in range(POWER_STEPS):
-        force = lifted @ (disturbance / np.linalg.norm(disturbance))
+        force = lifted @ (disturbance / float(np.linalg.norm(disturbance)))
         gain = float(np.linalg.norm(force))
-        disturbance = np.asarray(lifted.T @ force)
+        disturbance = lifted.T @ force
     return gain * float(np.sqrt(share))
 
 
@@ -339,7 +339,7 @@ def _slowest_decay(
     loops: _Spans, lyapunov: FloatArray, spans: int, rng: np.random.Generator
 ) -> float:
     """Decay rate (1/s) of a deviation along a path that keeps V as high as it can."""
-    x = rng.standard_normal(loops.transition.shape[1])
+    x: FloatArray = np.asarray(rng.standard_normal(loops.transition.shape[1]))
     x /= np.sqrt(x @ lyapunov @ x)
     fallen = 0.0
     for _ in range(spans):

@@ -190,7 +190,7 @@ def run_comparison(
             missing.append(contestant)
         else:
             entries[contestant.name] = known
-    for contestant, entry in _computed(specification, missing, workers, len(chosen), progress):
+    for contestant, entry in _computed_in_processes(specification, missing, workers, len(chosen), progress):
         store.write(contestant.name, prints[contestant.name], entry)
         entries[contestant.name] = entry
     conditions = _conditions(specification)
@@ -244,7 +244,7 @@ def compete(
 _TUNING_SHARE = 0.7
 
 
-def _computed(
+def _computed_in_processes(
     specification: ComparisonSpecification,
     missing: Sequence[Contestant],
     workers: int | None,

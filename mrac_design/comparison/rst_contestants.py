@@ -14,6 +14,7 @@ from mrac_design.comparison.contestant import (
     TunedAxis,
     TuningParameter,
 )
+from mrac_design.comparison.disturbance_observer import with_disturbance_observer
 from mrac_design.comparison.setting import AxisSetting
 from mrac_design.controller.adaptation import AdaptationLaw, NormalisedGradientLaw
 from mrac_design.controller.adaptive import GAIN_NAMES, AdaptiveRST, build_step, nominal_gains
@@ -35,6 +36,7 @@ BIAS = TuningParameter(name="bias regressor", unit="N", low=0.1, high=30.0, star
 BOX = TuningParameter(name="box", unit="", low=0.01, high=0.5, start=0.05)
 HARMONIC = TuningParameter(name="harmonic regressors", unit="N", low=0.03, high=30.0, start=1.0)
 TRACKING = TuningParameter(name="frequency tracking", unit="1/s", low=0.01, high=3.0, start=0.1)
+DRIVE = TuningParameter(name="drive", unit="m/s²", low=1e-3, high=20.0, start=0.02)
 HARMONICS = 5
 """Harmonics of the beat among the regressors."""
 _BOUNDED = 50.0
@@ -104,6 +106,20 @@ def rst_contestants() -> tuple[Contestant, ...]:
             _mrac_harmonic,
             replace(_BOXED, motion_model=True, periodicity=True),
             box_is_certified,
+        ),
+        _contestant(
+            "frozen_observer",
+            "frozen RST + inverse + observer",
+            (*rst, DRIVE),
+            _frozen_observer,
+            replace(_FIXED, motion_model=True),
+        ),
+        _contestant(
+            "mrac_observer",
+            "MRAC + inverse + observer",
+            (*adaptive, DRIVE),
+            _mrac_observer,
+            replace(_ADAPTING, motion_model=True, proof="none yet"),
         ),
     )
 
@@ -261,3 +277,23 @@ def _mrac_harmonic(setting: AxisSetting, beat: float, values: FloatArray) -> Tun
         bias=float(values[4]),
         oscillator=oscillator,
     )
+
+
+def _observed(setting: AxisSetting, axis: TunedAxis, drive: float) -> TunedAxis:
+    step = with_disturbance_observer(
+        axis.step,
+        plant=setting.plant,
+        domain=setting.domain,
+        delay=setting.delay,
+        drive=drive,
+        force_noise=setting.sensor_noise,
+    )
+    return replace(axis, step=step)
+
+
+def _frozen_observer(setting: AxisSetting, beat: float, values: FloatArray) -> TunedAxis:
+    return _observed(setting, _frozen_inverse(setting, beat, values), float(values[2]))
+
+
+def _mrac_observer(setting: AxisSetting, beat: float, values: FloatArray) -> TunedAxis:
+    return _observed(setting, _mrac_inverse(setting, beat, values), float(values[4]))

@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 
 import numpy as np
+from flint import fmpq
 from matplotlib.axes import Axes
 from matplotlib.colors import LinearSegmentedColormap
 
-from mrac_design.arrays import FloatArray
+from mrac_design.arrays import FloatArray, readonly
 from mrac_design.assessment.adaptation_loop import AdaptationLoop
 from mrac_design.assessment.hypotheses import Assessment
 from mrac_design.assessment.mismatch import InertiaMismatch
@@ -17,6 +18,7 @@ from mrac_design.assessment.prediction import Prediction
 from mrac_design.assessment.signals import AdaptationSignals
 from mrac_design.assessment.worst_case import WorstCases
 from mrac_design.design import RSTDesign
+from mrac_design.polynomials.rationals import decimal_rational
 from mrac_design.report.style import (
     COLOURS,
     SERIES_COLOURS,
@@ -31,8 +33,7 @@ from mrac_design.stability import (
     DesignMap,
     RegionGrid,
     StabilityCertificate,
-    rational_function,
-    region_on_grid,
+    candidate_conditions,
 )
 from mrac_design.stability.rational_function import to_float
 
@@ -46,6 +47,7 @@ def region_figure(design: RSTDesign) -> CaptionedFigure:
     specification = design.specification
     model, ao = specification.reference_model, specification.observer_pole
     omega, xi = model.bandwidth, model.damping
+    own = decimal_rational(xi)
     figure = new_figure(
         2.9,
         "Where an error model is strictly positive real (shaded), every point decided in exact "
@@ -59,19 +61,12 @@ def region_figure(design: RSTDesign) -> CaptionedFigure:
     dampings = np.linspace(0.1, 1.5, 57)
     observers = np.linspace(0.1, 4.0, 60)
 
-    def without_augmentation(c: float, damping: float) -> object:
-        return rational_function([1.0, c], [1.0, 2 * damping, 1.0])
-
-    def with_observer(c: float, pole: float) -> object:
-        return rational_function(
-            [1.0, 2 * c, c * c], np.polymul([1.0, pole], [1.0, 2 * xi, 1.0]).tolist()
-        )
-
-    for ax, function, second in (
-        (left, without_augmentation, dampings),
-        (right, with_observer, observers),
-    ):
-        _draw_region(ax, region_on_grid(function, ratios, second))  # type: ignore[arg-type]
+    grids = (
+        _region("(p + c)/Am", ratios, dampings, lambda c, xi: {"c": c, "xi": xi}),
+        _region("(p + c)²/(Ao Am)", ratios, observers, lambda c, ao: {"c": c, "ao": ao, "xi": own}),
+    )
+    for ax, grid in zip((left, right), grids, strict=True):
+        _draw_region(ax, grid)
         ax.set_xlabel("$c/\\omega$ (–)")
         ax.grid(False)
     left.plot(2 * dampings, dampings, color=COLOURS["limit"], linestyle=_DASHED)
@@ -83,6 +78,28 @@ def region_figure(design: RSTDesign) -> CaptionedFigure:
     return figure
 
 
+def _region(
+    name: str,
+    first: FloatArray,
+    second: FloatArray,
+    letters: Callable[[fmpq, fmpq], Mapping[str, fmpq]],
+) -> RegionGrid:
+    """Where the condition of a function holds, exactly, with ω = 1 and time scaled by it."""
+    condition = next(item for item in candidate_conditions() if item.name == name)
+    one = fmpq(1)
+    rest = {"K2": one, "omega": one, "xi": one, "ao": one}
+    rows = [
+        [
+            condition.holds({**rest, **letters(decimal_rational(x), decimal_rational(y))})
+            for y in second.tolist()
+        ]
+        for x in first.tolist()
+    ]
+    return RegionGrid(
+        first=readonly(first), second=readonly(second), strictly_positive_real=np.array(rows)
+    )
+
+
 def _draw_region(ax: Axes, grid: RegionGrid) -> None:
     ax.pcolormesh(
         grid.first,
@@ -90,6 +107,8 @@ def _draw_region(ax: Axes, grid: RegionGrid) -> None:
         grid.strictly_positive_real.T.astype(float),
         cmap=LinearSegmentedColormap.from_list("region", ["#ffffff", "#cfe4f1"]),
         shading="nearest",
+        edgecolors="face",
+        linewidth=0.4,
         vmin=0,
         vmax=1,
     )

@@ -15,8 +15,9 @@ from mrac_design.report.figures_stability import (
     region_figure,
 )
 from mrac_design.simulation.scenario import load_scenario
-from mrac_design.stability import DesignMap, sampling
+from mrac_design.stability import DesignMap, sampling, strictly_positive_real
 from mrac_design.study import scenario_design
+from mrac_design.verdict import Verdict
 
 
 @pytest.fixture(scope="module")
@@ -25,11 +26,19 @@ def design():
 
 
 def test_region_is_that_of_the_formula(design):
-    left, _ = region_figure(design).axes
+    left, right = region_figure(design).axes
     shaded = left.collections[0].get_array().reshape(57, 60)
     c, xi = np.meshgrid(np.linspace(0.05, 3.0, 60), np.linspace(0.1, 1.5, 57))
     inside = np.abs(c - 2 * xi) > 1e-9  # on the border itself the last digit decides
     np.testing.assert_array_equal(shaded[inside] == 1, (c < 2 * xi)[inside])
+    # The other region against the exact verdict on the function itself, point by point.
+    shaded = right.collections[0].get_array().reshape(60, 60)
+    ratios, poles = np.linspace(0.05, 3.0, 60), np.linspace(0.1, 4.0, 60)
+    for i, j in np.random.default_rng(0).integers(60, size=(40, 2)):
+        numerator = np.polymul([1.0, ratios[i]], [1.0, ratios[i]])
+        denominator = np.polymul([1.0, poles[j]], [1.0, 2.0, 1.0])
+        verdict = strictly_positive_real(numerator.tolist(), denominator.tolist()).verdict
+        assert (shaded[j, i] == 1) == (verdict is Verdict.PROVED)
 
 
 def test_map_writes_every_cell():

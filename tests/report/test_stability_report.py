@@ -1,4 +1,4 @@
-"""The stability report: written whole or not at all, its numbers computed, its certificates kept."""
+"""The stability report: written whole or not at all, numbers computed, certificates checked."""
 
 from __future__ import annotations
 

@@ -117,6 +117,31 @@ def test_the_same_seed_gives_the_same_run():
     assert np.any(runs[0] != runs[2])
 
 
+def test_projection_limits_every_gain_and_the_bias():
+    scenario = load_scenario("reality")
+    nominal = tuple(scenario_design(scenario).scaled_parameters)
+    values = scenario.adaptation.build(1.0, nominal=nominal).parameters(6)
+    np.testing.assert_allclose(values["gain_lower"], [*(0.95 * np.array(nominal)), -0.05])
+    np.testing.assert_allclose(values["gain_upper"], [*(1.05 * np.array(nominal)), 0.05])
+    assert values["leakage"] == 1.0
+    np.testing.assert_allclose(values["leakage_centre"], [*nominal, 0.0])
+
+
+def test_a_sensor_errs_by_its_bias_and_its_noise():
+    measured = load_scenario("reality").sampling
+    assert isinstance(measured, SampledMeasurement)
+    drawn = {
+        bias: replace(measured.force_sensor, bias=bias)
+        .errors(axes=3, period=1e-3, duration=4.0)
+        .coefficients[:, :, 0]
+        for bias in (0.0, 0.2)
+    }
+    np.testing.assert_allclose(drawn[0.2] - drawn[0.0], 0.2, atol=1e-15)
+    # 4000 samples: mean and deviation are known to 1.6 % and 1.1 % of 5 mN, five of them allowed.
+    np.testing.assert_allclose(drawn[0.0].mean(axis=1), 0.0, atol=0.08 * 5e-3)
+    np.testing.assert_allclose(drawn[0.0].std(axis=1), 5e-3, rtol=0.06)
+
+
 def test_the_certificate_covers_the_box_and_the_tissue():
     scenario = load_scenario("reality")
     design, choice = scenario_design(scenario), scenario.design
