@@ -67,12 +67,13 @@ def with_disturbance_observer(
     advanced, signals = step.advance(
         state["inner"], force, reference, applied + disturbance, symbols["inner"]
     )
-    acting = state["pending"][delay - 1] if delay else applied
+    waiting = ca.vertsplit(state["pending"]) if delay else []
+    acting = waiting[-1] if waiting else applied
     transition = ca.reshape(symbols["transition"], 3, 3).T
     following = {
         "inner": advanced,
         "estimate": transition @ filtered + symbols["input"] * acting,
-        "pending": ca.vertcat(applied, state["pending"][: delay - 1]) if delay else ca.SX(0, 1),
+        "pending": ca.vertcat(applied, *waiting[:-1]) if delay else ca.SX(0, 1),
     }
     resting = {
         "inner": step.equilibrium(force, symbols["inner"]),
