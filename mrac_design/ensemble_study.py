@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from dataclasses import asdict, dataclass, field, replace
+import re
+from dataclasses import asdict, dataclass, replace
 from functools import cached_property
 from importlib.metadata import version
 from pathlib import Path
-from typing import Any, Protocol
+from typing import Any
 
 import numpy as np
 
@@ -15,7 +15,7 @@ from mrac_design.arrays import FloatArray, readonly
 from mrac_design.controller.adaptive import build_step
 from mrac_design.controller.linearisation import build_linearisation, home_task_position
 from mrac_design.errors import ParameterError, ScenarioFileError, SimulationError
-from mrac_design.motion import DualFourierModel, HeartMotion, available_motions, find_model
+from mrac_design.motion import available_motions, find_model
 from mrac_design.motion.signal import PiecewisePolynomial
 from mrac_design.robot import RobotDescription, RobotDynamics, build_dynamics, load_robot
 from mrac_design.robot.parameters import parameter_names
@@ -29,12 +29,17 @@ from mrac_design.simulation.ensemble import (
     group_engine,
     run_ensemble,
 )
-from mrac_design.simulation.lanes import LANES, Case
+from mrac_design.simulation.lanes import LANES
 from mrac_design.simulation.reduction import tracking_reduction
 from mrac_design.simulation.run import Progress, RunSettings
-from mrac_design.simulation.sampling_choices import SampledMeasurement
 from mrac_design.simulation.scenario import Scenario
-from mrac_design.simulation.scenario_run import ReadyLoop, ready_loop, scenario_inputs
+from mrac_design.simulation.scenario_run import ReadyLoop, ready_loop
+from mrac_design.simulation.scenario_spread import (
+    MotionSource,
+    OneMotion,
+    ScenarioSpread,
+    SeededMotions,
+)
 from mrac_design.simulation.store import EnsembleStore
 from mrac_design.simulation.tableau import RK4
 from mrac_design.study import (
@@ -99,143 +104,286 @@ class EnsembleChoice:
             raise ParameterError("step", self.step, "must be a finite time > 0 s")
 
 
-class MotionSource(Protocol):
-    """The motions runs pick from."""
-
-    @property
-    def count(self) -> int:
-        """How many there are."""
-
-    def motion(self, number: int, duration: float) -> HeartMotion:
-        """Motion 0 … count − 1 over [0, duration] s."""
-
-
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
-class SeededMotions:
-    """One model's motions with successive seeds, its own seed first."""
-
-    model: DualFourierModel
-    """The model."""
-    count: int
-    """Number of seeds."""
-
-    def motion(self, number: int, duration: float) -> HeartMotion:
-        """See `MotionSource`."""
-        return self.model.with_seed(self.model.seed + number).motion(duration)
-
-
-@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
-class OneMotion:
-    """The same motion for all, as a recording gives it."""
-
-    recorded: HeartMotion
-    """The motion."""
-    count: int = 1
-    """One."""
-
-    def motion(self, number: int, duration: float) -> HeartMotion:
-        """See `MotionSource`."""
-        return self.recorded
-
-
-@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
-class ScenarioSpread:
-    """Draws runs around a scenario's own: a sampler for `Ensemble`, small enough to be sent.
-
-    Motions are made where they are needed. The heart lies so that every tissue carries the first
-    reference at the beginning, as in a run of the scenario itself.
-    """
+class PreparedEnsemble:
+    """An ensemble of a scenario, ready to run."""
 
     scenario: Scenario
     """The nominal choices."""
-    motions: MotionSource
-    """Heart motions."""
-    axes: tuple[int, ...]
-    """Components of the task that are force axes."""
-    tip: FloatArray
-    """Task position of the tip at home (m), shape (k,)."""
-    parameters: FloatArray
-    """Nominal parameters of the loop."""
-    initial_state: FloatArray
-    """State at time 0."""
-    held: FloatArray | None
-    """Memory at time 0."""
-    stiffness_places: tuple[int, ...]
-    """Entries of the parameters that are Ks."""
-    body_places: tuple[tuple[int, ...], ...]
-    """Entries that belong to each body of the true robot."""
-    gain_places: tuple[int, ...]
-    """Entries proportional to γ̂."""
-    stiffness_range: tuple[float, float]
-    """Limits of Ks (N/m)."""
-    gain_range: tuple[float, float]
-    """Limits of γ̂."""
-    inertia_spread: float
-    """Largest relative change of a body."""
-    _made: dict[int, PiecewisePolynomial] = field(default_factory=dict, init=False, repr=False)
+    choice: EnsembleChoice
+    """How many runs and how far apart."""
+    robot: RobotDescription
+    """The nominal robot."""
+    spread: ScenarioSpread
+    """What differs between runs."""
+    ensemble: Ensemble
+    """The runs."""
 
-    @property
-    def columns(self) -> tuple[str, ...]:
-        """Names of what `draw` returns."""
-        bodies = (f"body_scale[{i}]" for i in range(len(self.body_places)))
-        return ("stiffness", "adaptation_gain", "motion", *bodies)
 
-    def draw(self, random: np.random.Generator) -> FloatArray:
-        """Ks (N/m), γ̂, number of the motion, and a factor for each body, shape (columns,)."""
-        low, high = np.log(self.gain_range)
-        spread = self.inertia_spread
-        stiffness = random.uniform(*self.stiffness_range)
-        gain = np.exp(random.uniform(low, high)) if self.gain_places else 0.0
-        motion = random.integers(self.motions.count)
-        bodies = random.uniform(1 - spread, 1 + spread, len(self.body_places))
-        return np.array([stiffness, gain, motion, *bodies])
+@dataclass(frozen=True, kw_only=True, eq=False)
+class EnsembleRecord:
+    """A finished ensemble with what was drawn for it."""
 
-    def __call__(self, run: int, random: np.random.Generator) -> Case:
-        """The case of a run, from its generator alone."""
-        stiffness, gain, motion, *bodies = self.draw(random)
-        parameters = np.array(self.parameters)
-        parameters[list(self.stiffness_places)] = stiffness
-        parameters[list(self.gain_places)] *= gain / self.scenario.adaptation.gain
-        for places, factor in zip(self.body_places, bodies, strict=True):
-            parameters[list(places)] *= factor
-        return Case(
-            parameters=parameters,
-            initial_state=self.initial_state,
-            inputs=self._inputs(int(motion), stiffness),
-            held=self.held,
+    prepared: PreparedEnsemble
+    """What was run."""
+    result: EnsembleResult
+    """Metrics of every run; see `tracking_reduction`."""
+    computed: int
+    """Chunks that were run this time; the others were in the store."""
+    step_effect: float
+    """Largest change of a force metric (N) of the first runs with half the step."""
+
+    @cached_property
+    def draws(self) -> FloatArray:
+        """What was drawn, shape (runs, len(spread.columns))."""
+        spread, seed = self.prepared.spread, self.prepared.ensemble.seed
+        rows = (spread.draw(generator(seed, run)) for run in range(len(self.result.table)))
+        return readonly(np.array(list(rows)))
+
+    def drawn(self, column: str) -> FloatArray:
+        """A column of `draws` by name, shape (runs,)."""
+        return self.draws[:, self.prepared.spread.columns.index(column)]
+
+    def metric(self, name: str) -> FloatArray:
+        """A metric of all axes or joints, shape (runs, k); NaN where a run diverged."""
+        columns = [i for i, m in enumerate(self.result.metrics) if m.split("[")[0] == name]
+        return self.result.table[:, columns]
+
+    def values(self) -> dict[str, Any]:
+        """Distributions of the figures of merit as plain data, with what they rest on."""
+        prepared, scenario = self.prepared, self.prepared.scenario
+        ensemble, choice, robot = prepared.ensemble, prepared.choice, prepared.robot
+        joints = tuple(joint.name for joint in robot.joints)
+        finite = ~np.isnan(self.result.table).any(axis=1)
+        efforts = self.metric("max_effort")[finite]
+        first = prepared.spread.motions.motion(0, scenario.simulation.duration)
+        return {
+            "mrac_design": version("mrac-design"),
+            "scenario": scenario.name,
+            "robot": robot.name,
+            "motion": {"name": first.name, "origin": first.origin.value},
+            "runs": choice.runs,
+            "diverged": self.result.diverged,
+            "at_an_effort_limit": int((efforts >= robot.effort_limits).any(axis=1).sum()),
+            "drawn": _drawn(choice, prepared.spread),
+            "duration_s": scenario.simulation.duration,
+            "settling_s": scenario.simulation.settling,
+            "step_s": ensemble.settings.step,
+            "change_with_half_the_step_N": self.step_effect,
+            "fingerprint": ensemble.fingerprint(),
+            "metrics": {
+                **{
+                    f"{name}_N": _distributions(self.metric(name)[finite], robot.force_axes)
+                    for name in ("max_force_error", "rms_force_error", "max_model_error")
+                },
+                "max_effort": _distributions(efforts, joints),
+            },
+        }
+
+    def save_runs(self, path: Path) -> None:
+        """Write every run to an .npz file: `metrics`, `table`, `columns`, `draws`."""
+        np.savez_compressed(
+            path,
+            metrics=np.array(self.result.metrics),
+            table=self.result.table,
+            columns=np.array(self.prepared.spread.columns),
+            draws=self.draws,
         )
 
-    def _inputs(self, motion: int, stiffness: float) -> PiecewisePolynomial:
-        """Inputs over a motion, the heart where this tissue carries the first reference."""
-        if motion not in self._made:
-            self._made[motion] = self._nominal_inputs(motion)
-        nominal = self._made[motion]
-        moved = np.zeros(nominal.channels)
-        moved[: len(self.axes)] = self._depth(self.scenario.stiffness) - self._depth(stiffness)
-        return nominal.shifted(moved)
 
-    def _nominal_inputs(self, motion: int) -> PiecewisePolynomial:
-        scenario, duration = self.scenario, self.scenario.simulation.duration
-        sampling = scenario.sampling
-        if isinstance(sampling, SampledMeasurement):
-            sensor = replace(
-                sampling.force_sensor, seed=sampling.force_sensor.seed + motion
-            )
-            scenario = replace(scenario, sampling=replace(sampling, force_sensor=sensor))
-        made = self.motions.motion(motion, duration)
-        heart = made.displacement.restricted(0.0, duration).selected(self.axes)
-        rest = self.tip - self._depth(scenario.stiffness)
-        reference = scenario.reference.piecewise(duration)
-        return scenario_inputs(scenario, heart.shifted(rest - heart(0.0)[:, 0]), reference)
+def prepare_ensemble(scenario: Scenario, choice: EnsembleChoice) -> PreparedEnsemble:
+    """The ensemble of `choice` around `scenario`, nothing of it run yet.
 
-    def _depth(self, stiffness: float) -> FloatArray:
-        levels = [steps.levels[0] for steps in self.scenario.reference.steps]
-        return self.scenario.contact.build(stiffness).rest_depth(levels)
+    Raises the package's errors for anything in either that cannot be.
+    """
+    robot = load_robot(scenario.robot)
+    if len(robot.force_axes) != len(scenario.reference.steps):
+        raise ScenarioFileError(
+            scenario.name,
+            "reference",
+            f"{len(scenario.reference.steps)} axes given, but {robot.name} controls force on "
+            f"{', '.join(robot.force_axes)}",
+        )
+    dynamics = build_dynamics(robot)
+    motions = _motions(scenario, choice.motion_seeds)
+    duration = scenario.simulation.duration
+    inputs = exogenous_inputs(scenario, dynamics, motions.motion(0, duration))
+    ready = _ready(scenario, choice, dynamics, inputs)
+    spread = _spread(scenario, choice, dynamics, motions, ready)
+    size = inputs.coefficients.nbytes
+    chunk = int(np.clip(_CHUNK_BYTES / size, LANES, _LARGEST_CHUNK)) // LANES * LANES
+    system = ready.loop.system
+    ensemble = Ensemble(
+        system=system,
+        method=RK4,
+        reduction=tracking_reduction(system.outputs, settling=scenario.simulation.settling),
+        sampler=spread,
+        settings=RunSettings(
+            duration=duration,
+            step=choice.step or _step(scenario),
+            record_period=scenario.simulation.record_period,
+        ),
+        input_powers=inputs.degree + 1,
+        runs=choice.runs,
+        seed=choice.seed,
+        chunk=chunk,
+    )
+    return PreparedEnsemble(
+        scenario=scenario, choice=choice, robot=robot, spread=spread, ensemble=ensemble
+    )
 
-    def __getstate__(self) -> dict[str, Any]:
-        names = self.__dataclass_fields__
-        return {name: getattr(self, name) for name in names if name != "_made"}
 
-    def __setstate__(self, state: Mapping[str, Any]) -> None:
-        for name, value in {**state, "_made": {}}.items():
-            object.__setattr__(self, name, value)
+def run_prepared(
+    prepared: PreparedEnsemble,
+    *,
+    workers: Workers | None = None,
+    store: EnsembleStore | None = None,
+    progress: Progress | None = None,
+) -> EnsembleRecord:
+    """Run what is not yet in the store; see `run_ensemble`.
+
+    Raises SimulationError when not one run stayed within the finite numbers.
+    """
+    computed = 0
+
+    def count(fraction: float) -> None:
+        nonlocal computed
+        computed += 1
+        if progress is not None:
+            progress(fraction)
+
+    ensemble = prepared.ensemble
+    result = run_ensemble(ensemble, workers=workers, store=store, progress=count)
+    if result.diverged == ensemble.runs:
+        raise SimulationError(
+            f"all {ensemble.runs} runs left the finite numbers: take a smaller --step, or narrower "
+            "ranges"
+        )
+    return EnsembleRecord(
+        prepared=prepared,
+        result=result,
+        computed=computed,
+        step_effect=_step_effect(ensemble, result),
+    )
+
+
+def _motions(scenario: Scenario, seeds: int | None) -> MotionSource:
+    source = scenario.motion.source
+    if source in available_motions() or Path(source).suffix == ".toml":
+        return SeededMotions(model=find_model(source), count=seeds or _MOTION_SEEDS)
+    if seeds not in (None, 1):
+        raise ParameterError("motion seeds", seeds, f"{source} is a recording, which has no seeds")
+    return OneMotion(recorded=scenario_motion(scenario))
+
+
+def _ready(
+    scenario: Scenario,
+    choice: EnsembleChoice,
+    dynamics: RobotDynamics,
+    inputs: PiecewisePolynomial,
+) -> ReadyLoop:
+    """The nominal loop with the chosen controller."""
+    variant = next(variant for variant in VARIANTS if variant.name == choice.variant)
+    controller = variant_controller(scenario, scenario_design(scenario), variant)
+    axes = len(dynamics.description.force_axes)
+    return ready_loop(
+        scenario,
+        dynamics,
+        build_linearisation(
+            dynamics,
+            velocity_gain=scenario.design.velocity_gain,
+            tool_axis_bandwidth=scenario.design.tool_axis_bandwidth,
+            model_error=scenario.model_error,
+        ),
+        build_step(replace(controller, time_domain=controller_domain(scenario))),
+        force=readonly(inputs(0.0)[axes : 2 * axes, 0]),
+    )
+
+
+def _spread(
+    scenario: Scenario,
+    choice: EnsembleChoice,
+    dynamics: RobotDynamics,
+    motions: MotionSource,
+    ready: ReadyLoop,
+) -> ScenarioSpread:
+    robot, gain = dynamics.description, scenario.adaptation.gain
+    slices = ready.loop.system.parameters.slices
+    adapts = next(v.adapts for v in VARIANTS if v.name == choice.variant) and gain > 0
+    if choice.gain_range is not None and not adapts:
+        raise ParameterError("gain range", choice.gain_range, "nothing adapts in this controller")
+    bodies: list[list[int]] = [[] for _ in robot.joints]
+    for place, name in enumerate(parameter_names(robot), slices["inertia"].start):
+        bodies[int(re.sub(r"\D", "", name)) - 1].append(place)
+    stiffness = slices["stiffness"]
+    return ScenarioSpread(
+        scenario=scenario,
+        motions=motions,
+        axes=tuple(robot.task.position),
+        tip=readonly(home_task_position(dynamics)[: len(robot.force_axes)]),
+        parameters=ready.loop.parameter_values,
+        initial_state=ready.state,
+        held=ready.held,
+        stiffness_places=tuple(range(stiffness.start, stiffness.stop)),
+        body_places=tuple(tuple(places) for places in bodies),
+        gain_places=_gain_places(ready.loop) if adapts else (),
+        stiffness_range=choice.stiffness_range
+        or (0.6 * scenario.stiffness, 1.5 * scenario.stiffness),
+        gain_range=choice.gain_range or ((0.5 * gain, 2.0 * gain) if adapts else (1.0, 1.0)),
+        inertia_spread=choice.inertia_spread,
+    )
+
+
+def _gain_places(loop: ForceLoop) -> tuple[int, ...]:
+    places: list[int] = []
+    axes = loop.dynamics.description.force_axes
+    for axis, controller in zip(axes, loop.controllers, strict=True):
+        start = loop.system.parameters.slices[f"controller_{axis}"].start
+        own = controller.parameters.slices["adaptation_gain"]
+        places.extend(range(start + own.start, start + own.stop))
+    return tuple(places)
+
+
+def _step(scenario: Scenario) -> float:
+    design = scenario.design
+    return min(_LARGEST_STEP, 0.25 / max(design.bandwidth, design.observer_pole))
+
+
+def _step_effect(ensemble: Ensemble, result: EnsembleResult) -> float:
+    settings = replace(ensemble.settings, step=ensemble.settings.step / 2)
+    few = replace(ensemble, settings=settings, runs=min(ensemble.runs, LANES))
+    finer = chunk_metrics(few, group_engine(few), 0)
+    forces = [i for i, name in enumerate(result.metrics) if "error" in name]
+    change = np.abs(finer - result.table[: few.runs])[:, forces]
+    return float(np.nanmax(change)) if np.isfinite(change).any() else float("nan")
+
+
+def _drawn(choice: EnsembleChoice, spread: ScenarioSpread) -> dict[str, Any]:
+    return {
+        "seed": choice.seed,
+        "stiffness_N_per_m": list(spread.stiffness_range),
+        "adaptation_gain": list(spread.gain_range) if spread.gain_places else None,
+        "body_scale": [1 - spread.inertia_spread, 1 + spread.inertia_spread],
+        "motions": spread.motions.count,
+        "controller": choice.variant,
+    }
+
+
+def _distributions(rows: FloatArray, names: tuple[str, ...]) -> dict[str, dict[str, float]]:
+    """Where the values (runs, k) of each name lie."""
+    return {name: asdict(_distribution(rows[:, i])) for i, name in enumerate(names)}
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class _Distribution:
+    median: float
+    percentile_95: float
+    percentile_99: float
+    largest: float
+
+
+def _distribution(values: FloatArray) -> _Distribution:
+    median, high, higher = (float(v) for v in np.percentile(values, [50, 95, 99]))
+    return _Distribution(
+        median=median, percentile_95=high, percentile_99=higher, largest=float(values.max())
+    )

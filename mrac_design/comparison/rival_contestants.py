@@ -11,8 +11,8 @@ from mrac_design.comparison.contestant import (
     TunedAxis,
     TuningParameter,
 )
+from mrac_design.comparison.leading_inverse import LEAD, LeadingInverse
 from mrac_design.comparison.setting import AxisSetting
-from mrac_design.controller.reference import ModelInverse
 from mrac_design.controller.rivals.active_observer import (
     ActiveObserver,
     ObserverTuning,
@@ -55,8 +55,8 @@ def rival_contestants() -> tuple[Contestant, ...]:
     horizon = (HORIZON, MOVES, PENALTY)
     return (
         _rival("learning", "PI + iterative learning", _LEARNING, _learning, periodic=True),
-        _rival("observer", "active observer, order 1", (TIME_CONSTANT, DRIVE), _observer),
-        _rival("observer_2", "active observer, order 2", (TIME_CONSTANT, DRIVE), _observer_2),
+        _rival("observer", "active observer, order 1", (TIME_CONSTANT, DRIVE, LEAD), _observer),
+        _rival("observer_2", "active observer, order 2", (TIME_CONSTANT, DRIVE, LEAD), _observer_2),
         _rival(
             "observers",
             "two active observers",
@@ -65,6 +65,7 @@ def rival_contestants() -> tuple[Contestant, ...]:
                 DRIVE,
                 TuningParameter(name="$\\tau_2$", unit="s", low=2e-4, high=0.03, start=0.002),
                 TuningParameter(name="drive 2", unit="N", low=1e-5, high=0.1, start=1e-3),
+                LEAD,
             ),
             _observers,
         ),
@@ -175,7 +176,10 @@ def _tuning(setting: AxisSetting, order: int, time_constant: float, drive: float
 
 
 def _active(
-    setting: AxisSetting, force_loop: ObserverTuning, motion_loop: ObserverTuning | None
+    setting: AxisSetting,
+    force_loop: ObserverTuning,
+    motion_loop: ObserverTuning | None,
+    lead: float,
 ) -> TunedAxis:
     controller = active_observer(
         ActiveObserver(
@@ -183,7 +187,7 @@ def _active(
             force_loop=force_loop,
             motion_loop=motion_loop,
             prefilter=setting.prefilter,
-            feedforward=ModelInverse(),
+            feedforward=LeadingInverse(lead),
             time_domain=setting.domain,
             delay=setting.delay,
         )
@@ -192,20 +196,20 @@ def _active(
 
 
 def _observer(setting: AxisSetting, beat: float, values: FloatArray) -> TunedAxis:
-    return _active(setting, _tuning(setting, 1, float(values[0]), float(values[1])), None)
+    return _active(setting, _tuning(setting, 1, float(values[0]), float(values[1])), None, float(values[2]))
 
 
 def _observer_2(setting: AxisSetting, beat: float, values: FloatArray) -> TunedAxis:
     # The second difference of a smooth motion is smaller than the first by about the time
     # over which it changes, so one range of drives serves both orders.
     drive = float(values[1]) * setting.period / _CHANGE
-    return _active(setting, _tuning(setting, 2, float(values[0]), drive), None)
+    return _active(setting, _tuning(setting, 2, float(values[0]), drive), None, float(values[2]))
 
 
 def _observers(setting: AxisSetting, beat: float, values: FloatArray) -> TunedAxis:
     inner = _tuning(setting, 1, float(values[0]), float(values[1]))
     outer = _tuning(setting, 1, float(values[2]), float(values[3]))
-    return _active(setting, inner, outer)
+    return _active(setting, inner, outer, float(values[4]))
 
 
 def _horizon(first: int, last: float, moves: float, penalty: float) -> Horizon:

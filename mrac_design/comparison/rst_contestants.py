@@ -15,11 +15,12 @@ from mrac_design.comparison.contestant import (
     TuningParameter,
 )
 from mrac_design.comparison.disturbance_observer import with_disturbance_observer
+from mrac_design.comparison.leading_inverse import LEAD, LeadingInverse
 from mrac_design.comparison.setting import AxisSetting
 from mrac_design.controller.adaptation import AdaptationLaw, NormalisedGradientLaw
 from mrac_design.controller.adaptive import GAIN_NAMES, AdaptiveRST, build_step, nominal_gains
 from mrac_design.controller.oscillator import Oscillator
-from mrac_design.controller.reference import DirectReference, ModelInverse, ReferenceFeedforward
+from mrac_design.controller.reference import DirectReference, ReferenceFeedforward
 from mrac_design.controller.rivals.linear import build_linear_step
 from mrac_design.controller.rivals.rst_integral import IntegralRST, integral_rst
 from mrac_design.controller.robust import GainBox, WithProjection
@@ -75,7 +76,7 @@ def rst_contestants() -> tuple[Contestant, ...]:
     adaptive = (*rst, GAIN, NORMALISATION)
     return (
         _contestant("frozen", "frozen RST", rst, _frozen),
-        _contestant("frozen_inverse", "frozen RST + inverse", rst, _frozen_inverse),
+        _contestant("frozen_inverse", "frozen RST + inverse", (*rst, LEAD), _frozen_inverse),
         _contestant(
             "integral",
             "RST with integrator",
@@ -84,17 +85,18 @@ def rst_contestants() -> tuple[Contestant, ...]:
                 TuningParameter(
                     name="$\\omega_o$", unit="rad/s", low=20.0, high=1000.0, start=100.0
                 ),
-                TuningParameter(name="$\\xi_o$", unit="", low=0.5, high=2.0, start=0.9),
+                TuningParameter(name="$\\xi_o$", unit="", low=0.3, high=2.0, start=0.9),
+                LEAD,
             ),
             _integral,
         ),
         _contestant("mrac", "MRAC", adaptive, _mrac, _ADAPTING),
-        _contestant("mrac_inverse", "MRAC + inverse", adaptive, _mrac_inverse, _ADAPTING),
-        _contestant("mrac_bias", "MRAC + inverse + bias", (*adaptive, BIAS), _mrac_bias, _ADAPTING),
+        _contestant("mrac_inverse", "MRAC + inverse", (*adaptive, LEAD), _mrac_inverse, _ADAPTING),
+        _contestant("mrac_bias", "MRAC + inverse + bias", (*adaptive, BIAS, LEAD), _mrac_bias, _ADAPTING),
         _contestant(
             "mrac_certified",
             "MRAC + inverse + bias, boxed",
-            (*adaptive, BIAS, BOX),
+            (*adaptive, BIAS, BOX, LEAD),
             _mrac_certified,
             _BOXED,
             box_is_certified,
@@ -102,7 +104,7 @@ def rst_contestants() -> tuple[Contestant, ...]:
         _contestant(
             "mrac_harmonic",
             "MRAC + inverse + harmonics, boxed",
-            (*adaptive, BIAS, BOX, HARMONIC, TRACKING),
+            (*adaptive, BIAS, BOX, HARMONIC, TRACKING, LEAD),
             _mrac_harmonic,
             replace(_BOXED, motion_model=True, periodicity=True),
             box_is_certified,
@@ -110,14 +112,14 @@ def rst_contestants() -> tuple[Contestant, ...]:
         _contestant(
             "frozen_observer",
             "frozen RST + inverse + observer",
-            (*rst, DRIVE),
+            (*rst, DRIVE, LEAD),
             _frozen_observer,
             replace(_FIXED, motion_model=True),
         ),
         _contestant(
             "mrac_observer",
             "MRAC + inverse + observer",
-            (*adaptive, DRIVE),
+            (*adaptive, DRIVE, LEAD),
             _mrac_observer,
             replace(_ADAPTING, motion_model=True, proof="none yet"),
         ),
@@ -208,7 +210,7 @@ def _frozen(setting: AxisSetting, beat: float, values: FloatArray) -> TunedAxis:
 
 
 def _frozen_inverse(setting: AxisSetting, beat: float, values: FloatArray) -> TunedAxis:
-    return _axis(setting, values, _STILL, feedforward=ModelInverse())
+    return _axis(setting, values, _STILL, feedforward=LeadingInverse(float(values[-1])))
 
 
 def _integral(setting: AxisSetting, beat: float, values: FloatArray) -> TunedAxis:
@@ -218,7 +220,7 @@ def _integral(setting: AxisSetting, beat: float, values: FloatArray) -> TunedAxi
             reference_model=ReferenceModel(bandwidth=float(values[0]), damping=1.0),
             observer=ReferenceModel(bandwidth=float(values[1]), damping=float(values[2])),
             prefilter=setting.prefilter,
-            feedforward=ModelInverse(),
+            feedforward=LeadingInverse(float(values[-1])),
             time_domain=setting.domain,
         )
     )
@@ -245,17 +247,17 @@ def _mrac(setting: AxisSetting, beat: float, values: FloatArray) -> TunedAxis:
 
 
 def _mrac_inverse(setting: AxisSetting, beat: float, values: FloatArray) -> TunedAxis:
-    return _axis(setting, values, _law(values), feedforward=ModelInverse())
+    return _axis(setting, values, _law(values), feedforward=LeadingInverse(float(values[-1])))
 
 
 def _mrac_bias(setting: AxisSetting, beat: float, values: FloatArray) -> TunedAxis:
     bias = float(values[4])
-    return _axis(setting, values, _law(values), feedforward=ModelInverse(), bias=bias)
+    return _axis(setting, values, _law(values), feedforward=LeadingInverse(float(values[-1])), bias=bias)
 
 
 def _mrac_certified(setting: AxisSetting, beat: float, values: FloatArray) -> TunedAxis:
     law = _boxed(setting, values, len(GAIN_NAMES) - 5)
-    return _axis(setting, values, law, feedforward=ModelInverse(), bias=float(values[4]))
+    return _axis(setting, values, law, feedforward=LeadingInverse(float(values[-1])), bias=float(values[4]))
 
 
 def _mrac_harmonic(setting: AxisSetting, beat: float, values: FloatArray) -> TunedAxis:
@@ -273,7 +275,7 @@ def _mrac_harmonic(setting: AxisSetting, beat: float, values: FloatArray) -> Tun
         setting,
         values,
         law,
-        feedforward=ModelInverse(),
+        feedforward=LeadingInverse(float(values[-1])),
         bias=float(values[4]),
         oscillator=oscillator,
     )

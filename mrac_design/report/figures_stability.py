@@ -153,11 +153,12 @@ def bounds_figure(cases: Mapping[str, WorstCases]) -> CaptionedFigure:
         "refute the certificate; a point near 1 shows that it is not conservative there.",
     )
     ax = figure.subplots()
-    names = [item.name for item in next(iter(cases.values())).comparisons]
+    names = list(dict.fromkeys(item.name for found in cases.values() for item in found.comparisons))
     for number, (title, found) in enumerate(cases.items()):
-        height = np.arange(len(names)) + 0.16 * (number - (len(cases) - 1) / 2)
+        aside = 0.16 * (number - (len(cases) - 1) / 2)
         ratios = [item.ratio for item in found.comparisons]
-        ax.plot(ratios, height, "o", color=SERIES_COLOURS[number], label=title)
+        heights = [names.index(item.name) + aside for item in found.comparisons]
+        ax.plot(ratios, heights, "o", color=SERIES_COLOURS[number], label=title)
     ax.axvline(1, color=COLOURS["frozen"], linestyle=_DASHED, label="refuted left of here")
     ax.set_xscale("log")
     ax.set_xlim(0.7, None)
