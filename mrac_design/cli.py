@@ -16,7 +16,7 @@ from rich.logging import RichHandler
 from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn
 from rich.table import Table
 
-from mrac_design.cli_certify import certify, verify
+from mrac_design.cli_certify import certify, stability, verify
 from mrac_design.cli_export import export
 from mrac_design.cli_options import DesignOptions, StudyOptions, takes
 from mrac_design.cli_realtime import realtime
@@ -176,6 +176,7 @@ def check_model(
 app.command()(export)
 app.command()(certify)
 app.command()(verify)
+app.command()(stability)
 app.command()(realtime)
 
 

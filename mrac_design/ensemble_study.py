@@ -335,12 +335,18 @@ def _spread(
 
 
 def _gain_places(loop: ForceLoop) -> tuple[int, ...]:
+    """Where γ̂ stands; the controllers' parameters follow each other axis by axis."""
+    slices = loop.system.parameters.slices
+    first = f"controller_{loop.dynamics.description.force_axes[0]}"
+    if first in slices:
+        start = slices[first].start
+    else:  # a sampled loop keeps them in one block, the linearisation's before them
+        start = slices["controller"].stop - sum(c.parameters.size for c in loop.controllers)
     places: list[int] = []
-    axes = loop.dynamics.description.force_axes
-    for axis, controller in zip(axes, loop.controllers, strict=True):
-        start = loop.system.parameters.slices[f"controller_{axis}"].start
+    for controller in loop.controllers:
         own = controller.parameters.slices["adaptation_gain"]
         places.extend(range(start + own.start, start + own.stop))
+        start += controller.parameters.size
     return tuple(places)
 
 

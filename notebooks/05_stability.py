@@ -361,8 +361,9 @@ Table(
 #
 # Gains and stiffness jump at will between points of the box: by chance, or chosen backwards in
 # time by an adversary who knows the certificate. The disturbance is the worst for that very path.
-# In the last row of each table the gains are moved by the law itself, from random starts in the box, for several
-# $\hat\gamma$, on random stiffness and random hearts. No simulated value may exceed its bound.
+# In the last row of each table the gains are moved by the law itself, from random starts in the
+# box, for several $\hat\gamma$, on random stiffness and random hearts. No simulated value may
+# exceed its bound.
 
 # %%
 hostile = choices.hostile

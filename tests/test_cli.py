@@ -84,7 +84,7 @@ def test_check_model_names_what_the_robot_is(mrac):
 
 
 COMMANDS = (
-    "report", "simulate", "design", "check-model", "export", "certify", "verify", "realtime",
+    "report", "simulate", "design", "check-model", "export", "certify", "verify", "stability", "realtime",
 )  # fmt: skip
 
 

@@ -50,7 +50,7 @@ def adaptive_runs(
     """Peak force per peak of d = Ẍh + K2 Ẋh over `runs` runs, γ̂ going round through `gains`.
 
     The force reference is zero, so that all force is the heart's. The certified bound holds for
-    the projected gains whatever γ̂ is.
+    the projected gains whatever γ̂ is; the law is the scenario's own without bias and safeguards.
     """
     rng = np.random.default_rng(seed)
     box = projection_box(certificate.box)

@@ -52,9 +52,8 @@ class CertifiedDesign:
 
 def continuous_design(scenario: Scenario, choices: StabilityChoices) -> CertifiedDesign:
     """The scenario's own design with its law in continuous time."""
-    return _certified(
-        "continuous, as published", scenario, Continuous(), choices.continuous_box, choices
-    )
+    title = f"continuous, ω = {scenario.design.bandwidth:g} rad/s"
+    return _certified(title, scenario, Continuous(), choices.continuous_box, choices)
 
 
 def sampled_design(scenario: Scenario, choices: StabilityChoices) -> CertifiedDesign:

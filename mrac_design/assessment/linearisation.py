@@ -108,7 +108,8 @@ def certificate_gap(certificate: StabilityCertificate, loop: AxisLoop) -> float:
     Largest entry of S M − A S over the corners of the box, relative to the largest entry of A:
     M is the linearised loop with its gains and stiffness at the corner, A the certificate's matrix
     there and S the scaling of the state. `loop` has the certificate's timing; its adaptation may
-    be anything, for no gain moves at zero force.
+    be anything, for no gain moves at zero force. The gains' own columns are left out: they are the
+    path, and a bias among them acts as a disturbance.
     """
     worst = 0.0
     ends = zip(certificate.box.corners(), _vertex_matrices(certificate), strict=False)

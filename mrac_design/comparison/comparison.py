@@ -190,7 +190,9 @@ def run_comparison(
             missing.append(contestant)
         else:
             entries[contestant.name] = known
-    for contestant, entry in _computed_in_processes(specification, missing, workers, len(chosen), progress):
+    for contestant, entry in _computed_in_processes(
+        specification, missing, workers, len(chosen), progress
+    ):
         store.write(contestant.name, prints[contestant.name], entry)
         entries[contestant.name] = entry
     conditions = _conditions(specification)

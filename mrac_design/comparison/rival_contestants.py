@@ -196,7 +196,9 @@ def _active(
 
 
 def _observer(setting: AxisSetting, beat: float, values: FloatArray) -> TunedAxis:
-    return _active(setting, _tuning(setting, 1, float(values[0]), float(values[1])), None, float(values[2]))
+    return _active(
+        setting, _tuning(setting, 1, float(values[0]), float(values[1])), None, float(values[2])
+    )
 
 
 def _observer_2(setting: AxisSetting, beat: float, values: FloatArray) -> TunedAxis:

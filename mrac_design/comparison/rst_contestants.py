@@ -85,14 +85,16 @@ def rst_contestants() -> tuple[Contestant, ...]:
                 TuningParameter(
                     name="$\\omega_o$", unit="rad/s", low=20.0, high=1000.0, start=100.0
                 ),
-                TuningParameter(name="$\\xi_o$", unit="", low=0.3, high=2.0, start=0.9),
+                TuningParameter(name="$\\xi_o$", unit="", low=0.2, high=2.0, start=0.7),
                 LEAD,
             ),
             _integral,
         ),
         _contestant("mrac", "MRAC", adaptive, _mrac, _ADAPTING),
         _contestant("mrac_inverse", "MRAC + inverse", (*adaptive, LEAD), _mrac_inverse, _ADAPTING),
-        _contestant("mrac_bias", "MRAC + inverse + bias", (*adaptive, BIAS, LEAD), _mrac_bias, _ADAPTING),
+        _contestant(
+            "mrac_bias", "MRAC + inverse + bias", (*adaptive, BIAS, LEAD), _mrac_bias, _ADAPTING
+        ),
         _contestant(
             "mrac_certified",
             "MRAC + inverse + bias, boxed",
@@ -252,12 +254,16 @@ def _mrac_inverse(setting: AxisSetting, beat: float, values: FloatArray) -> Tune
 
 def _mrac_bias(setting: AxisSetting, beat: float, values: FloatArray) -> TunedAxis:
     bias = float(values[4])
-    return _axis(setting, values, _law(values), feedforward=LeadingInverse(float(values[-1])), bias=bias)
+    return _axis(
+        setting, values, _law(values), feedforward=LeadingInverse(float(values[-1])), bias=bias
+    )
 
 
 def _mrac_certified(setting: AxisSetting, beat: float, values: FloatArray) -> TunedAxis:
     law = _boxed(setting, values, len(GAIN_NAMES) - 5)
-    return _axis(setting, values, law, feedforward=LeadingInverse(float(values[-1])), bias=float(values[4]))
+    return _axis(
+        setting, values, law, feedforward=LeadingInverse(float(values[-1])), bias=float(values[4])
+    )
 
 
 def _mrac_harmonic(setting: AxisSetting, beat: float, values: FloatArray) -> TunedAxis:

@@ -24,6 +24,8 @@ MILLI = 1e3
 """From N to mN."""
 _BANDS = 24
 """Intervals of stiffness at most."""
+_FAR_OFF = 20
+"""Worst run over median from which an axis is logarithmic."""
 _RUNS_A_BAND = 20
 """Runs an interval should hold, so that its percentiles mean something."""
 
@@ -51,7 +53,7 @@ def ensemble_figure(record: EnsembleRecord) -> CaptionedFigure:
         drawn = [
             _exceedance(ax, rows[:, i], axis, SERIES_COLOURS[i]) for i, axis in enumerate(axes)
         ]
-        ax.set(xscale="log", yscale="log", xlabel=label)
+        ax.set(xscale=_scale(rows), yscale="log", xlabel=label)
         if number == 0:
             ax.set_ylabel("share of runs")
     width, first = 6 // len(axes), None
@@ -59,12 +61,17 @@ def ensemble_figure(record: EnsembleRecord) -> CaptionedFigure:
         ax = figure.add_subplot(grid[1, width * i : width * (i + 1)], sharey=first)
         _bands(ax, record.drawn("stiffness")[finite], largest[:, i], SERIES_COLOURS[i])
         ax.axvline(values.scenario.design.stiffness, color="#5c6672", linestyle=":")
-        ax.set(xlabel="$K_s$ (N/m)", title=f"axis {axis}", yscale="log")
+        ax.set(xlabel="$K_s$ (N/m)", title=f"axis {axis}", yscale=_scale(largest))
         first = first or ax
     if first is not None:
         first.set_ylabel("max $|y - F_d|$ (mN)")
-    styles = (("worst", ":"), ("95 %", "--"), ("median", "-"))
-    keys = [Line2D([], [], color="#5c6672", linestyle=s, label=name) for name, s in styles]
+        if first.get_yscale() == "linear":
+            first.set_ylim(0.0, None)
+    keys = [
+        Line2D([], [], color="#5c6672", linestyle=":", label="worst"),
+        Line2D([], [], color="#5c6672", linestyle="--", label="95 %"),
+        Line2D([], [], color="#5c6672", linestyle="-", label="median"),
+    ]
     legend_above(figure, [*drawn, *keys])
     return figure
 
@@ -90,6 +97,11 @@ def stiffness_bands(stiffness: FloatArray, errors: FloatArray) -> tuple[FloatArr
     centres = np.array([stiffness[part].mean() for part in parts])
     levels = [np.percentile(errors[part], [50, 95, 100]) for part in parts]
     return centres, np.array(levels).T
+
+
+def _scale(errors: FloatArray) -> str:
+    """Logarithmic where a few runs are so far off that the others would be squeezed together."""
+    return "log" if errors.max() > _FAR_OFF * np.median(errors) > 0 else "linear"
 
 
 def _exceedance(ax: Axes, errors: FloatArray, label: str, colour: str) -> Line2D:

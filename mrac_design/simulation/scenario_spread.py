@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+import io
+import pickle
 from dataclasses import dataclass, field, replace
-from typing import Any, Protocol
+from typing import Protocol
 
 import numpy as np
 
@@ -148,10 +149,16 @@ class ScenarioSpread:
         levels = [steps.levels[0] for steps in self.scenario.reference.steps]
         return self.scenario.contact.build(stiffness).rest_depth(levels)
 
-    def __getstate__(self) -> dict[str, Any]:
+    def __getstate__(self) -> bytes:
+        # Neither shared objects nor flags of arrays are noted (protocol 5 would): equal spreads
+        # have equal bytes whoever made them, so a store knows its ensemble again.
+        buffer = io.BytesIO()
+        pickler = pickle.Pickler(buffer, protocol=4)
+        pickler.fast = True
         names = self.__dataclass_fields__
-        return {name: getattr(self, name) for name in names if name != "_made"}
+        pickler.dump({name: getattr(self, name) for name in names if name != "_made"})
+        return buffer.getvalue()
 
-    def __setstate__(self, state: Mapping[str, Any]) -> None:
-        for name, value in {**state, "_made": {}}.items():
+    def __setstate__(self, state: bytes) -> None:
+        for name, value in {**pickle.loads(state), "_made": {}}.items():
             object.__setattr__(self, name, value)

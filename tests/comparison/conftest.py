@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import pytest
 
 from mrac_design.comparison import (
@@ -35,15 +37,25 @@ def setting():
 
 @pytest.fixture(scope="session")
 def specification():
-    return comparison_specification(
-        load_scenario("reality"), budget=4, seeds=2, taking_part=NAMES
-    )
+    return comparison_specification(load_scenario("reality"), budget=4, seeds=2, taking_part=NAMES)
 
 
 @pytest.fixture(scope="session")
 def conditions(specification):
     return condition_set(
         specification.setting, specification.motion, axis="Z", stiffness_factor=1.5
+    )
+
+
+@pytest.fixture(scope="session")
+def short(conditions):
+    """The first seconds of the training motion."""
+    whole = conditions.training
+    return replace(
+        whole,
+        heart=whole.heart.restricted(0.0, 8.0),
+        reference=whole.reference.restricted(0.0, 8.0),
+        settling=2.0,
     )
 
 
