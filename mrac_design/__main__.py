@@ -11,7 +11,7 @@ def main() -> None:
         from mrac_design.verify.__main__ import main as verify
 
         sys.exit(verify(sys.argv[2:]))
-    from mrac_design.cli import main as command_line
+    from mrac_design.cli.app import main as command_line
 
     command_line()
 

@@ -8,7 +8,7 @@ import re
 import numpy as np
 import pytest
 
-from mrac_design import cli
+from mrac_design.cli import app as cli
 from mrac_design.resources import models_directory
 
 
@@ -84,7 +84,8 @@ def test_check_model_names_what_the_robot_is(mrac):
 
 
 COMMANDS = (
-    "report", "simulate", "design", "check-model", "export", "certify", "verify", "stability", "realtime",
+    "report", "simulate", "design", "check-model", "export", "certify", "verify", "stability",
+    "realtime", "ensemble", "compare",
 )  # fmt: skip
 
 

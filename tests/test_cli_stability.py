@@ -8,7 +8,7 @@ import pytest
 import typer
 from typer.testing import CliRunner
 
-from mrac_design.cli_certify import stability
+from mrac_design.cli.certify import stability
 from mrac_design.report import stability_report
 from mrac_design.report.stability_report import StabilityReport
 

@@ -226,7 +226,7 @@ def _winner(comparison: Comparison, condition: str, title: str) -> str:
 
 def _strangers(comparison: Comparison) -> str:
     names = [c.name for c in comparison.conditions.judged[2:]]
-    titles = {c.name: c.title for c in comparison.conditions.judged}
+    titles = {name: _short(name) for name in names}
     firsts = {name: ranking(comparison, name)[0] for name in names}
     text = "On motions nobody was tuned on, the smallest error is "
     winners = dict.fromkeys(winner.title for winner in firsts.values())
@@ -286,7 +286,7 @@ def _bought(comparison: Comparison, adaptive: str, fixed: str) -> str:
     costs: list[str] = []
     for condition in comparison.conditions.judged:
         gap = difference(comparison, adaptive, fixed, condition.name)
-        shown = f"{condition.title} ({100 * gap.relative:+.0f} %)"
+        shown = f"{_short(condition.name)} ({100 * gap.relative:+.0f} %)"
         group = nothing if not gap.decided else buys if gap.mean < 0 else costs
         group.append(shown)
     parts = [
@@ -303,8 +303,12 @@ def _noise(comparison: Comparison) -> str:
     share = (limit.amplification * limit.noise / limit.error) ** 2
     return (
         f"Of the limit's square, {100 * share:.0f} % is sensor noise that no linear controller "
-        "can both use and ignore; a better sensor lowers the floor, better adaptation does not."
+        "can both use and ignore: a better sensor would lower that floor first."
     )
+
+
+def _short(condition: str) -> str:
+    return f"“{condition.replace('_', ' ')}”"
 
 
 def _interval(measured: Measured) -> str:

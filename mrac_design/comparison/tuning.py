@@ -2,8 +2,8 @@
 
 Minimised is the rms force error over the training motion. A tuning is admissible when, with
 `extra_delay` samples more dead time than it was designed for, that error grows by no more than
-`allowed_growth`: simulated, so the rule is the same for linear and adaptive laws. Beyond it the
-excess is added to the objective. A contestant that claims a proof must have it.
+`allowed_growth`: simulated, so the rule is the same for linear and adaptive laws. Beyond it ten
+times the excess is added to the objective. A contestant that claims a proof must have it.
 """
 
 from __future__ import annotations
@@ -28,6 +28,8 @@ FEWEST = 4
 """Smallest budget."""
 WORST = 10.0
 """Error that stands for a loop that diverges (N)."""
+EXCESS_WEIGHT = 10.0
+"""Cost of breaking the rule on dead time: well above what the error can gain by it."""
 NOISE_SEED = 0
 """Seed of the sensor noise while tuning; judging uses others."""
 
@@ -153,7 +155,7 @@ class _Search:
         values = self.contestant.values(position)
         error, delayed = self._errors(values)
         allowed = self.bench.setting.allowed_growth * error
-        value = error + max(0.0, delayed - allowed)
+        value = error + EXCESS_WEIGHT * max(0.0, delayed - allowed)
         proved = True
         # Proofs are dear, so only what would become the best has to show one.
         if self.contestant.proof is not None and value < self.best_value:

@@ -27,6 +27,8 @@ FAMILY_COLOURS = {
     Family.RIVAL: SERIES_COLOURS[2],
 }
 """Colour of each family."""
+DETAIL = 2.0
+"""Contestants whose motion error is within this factor of the least are shown enlarged."""
 FAMILY_MARKERS = {Family.FROZEN: "s", Family.ADAPTIVE: "o", Family.RIVAL: "^"}
 """Marker of each family."""
 
@@ -78,13 +80,12 @@ def _draw_error(
 def pareto_figure(comparison: Comparison) -> CaptionedFigure:
     """What the motion leaves against what sensor noise causes, with the front of the limit."""
     figure = new_figure(
-        4.4,
+        4.8,
         "Force error that the motion leaves with a perfect sensor, against the amplification of "
-        "sensor noise, on the held-back motion. Nothing linear and causal lies below the line; "
-        "the dot on it is the limit for this sensor. The dashed steps join the contestants that "
-        "no other beats in both.",
+        "sensor noise, on the held-back motion; left all, right the best of them. Nothing linear "
+        "and causal lies below the line; the dot on it is the limit for this sensor. Dashed steps "
+        "join the contestants that no other beats in both.",
     )
-    ax = figure.subplots()
     points = {
         c: (
             comparison.entries[c.name].judgement.amplification,
@@ -93,28 +94,52 @@ def pareto_figure(comparison: Comparison) -> CaptionedFigure:
         for c in comparison.contestants
     }
     drawn = {c: point for c, point in points.items() if np.isfinite(point).all()}
-    _draw_front(ax, comparison, drawn)
-    keys = []
-    for number, (contestant, (x, y)) in enumerate(drawn.items(), start=1):
-        colour, marker = FAMILY_COLOURS[contestant.family], FAMILY_MARKERS[contestant.family]
-        ax.plot(x, y, marker=marker, color=colour, markersize=5, linestyle="none")
-        ax.annotate(
-            str(number), (x, y), xytext=(4, 3), textcoords="offset points", fontsize=7, color=colour
-        )
-        label = f"{number} {contestant.title}"
-        keys.append(Line2D([], [], color=colour, marker=marker, linestyle="none", label=label))
-    ax.set(
-        xlabel="noise amplification (rms force / rms sensor noise)",
-        ylabel="motion error (mN rms)",
-        yscale="log",
-    )
-    ax.yaxis.set_major_formatter("{x:g}")
+    whole, detail = figure.subplots(1, 2, width_ratios=[1.0, 1.6])
     x, y = np.array(list(drawn.values())).T
-    ax.set_xlim(0.0, 1.15 * x.max())
+    for ax in (whole, detail):
+        _draw_front(ax, comparison, drawn)
+        ax.set(xlabel="noise amplification", yscale="log")
+        ax.yaxis.set_major_formatter("{x:g}")
+        ax.yaxis.set_minor_formatter("")
+    for contestant, (own_x, own_y) in drawn.items():
+        colour, marker = FAMILY_COLOURS[contestant.family], FAMILY_MARKERS[contestant.family]
+        whole.plot(own_x, own_y, marker=marker, color=colour, markersize=4, linestyle="none")
+    whole.set_ylabel("motion error (mN rms)")
     lowest = MILLI * comparison.limits[comparison.conditions.judged[0].name].motion_error
-    ax.set_ylim(0.5 * min(lowest, y.min()), 1.6 * y.max())
+    whole.set(xlim=(0.0, 1.15 * x.max()), ylim=(0.5 * min(lowest, y.min()), 1.6 * y.max()))
+    _draw_detail(detail, drawn)
+    keys = [
+        Line2D(
+            [], [], color=FAMILY_COLOURS[c.family], marker=FAMILY_MARKERS[c.family],
+            linestyle="none", label=f"{number} {c.title}",
+        )
+        for number, c in enumerate(drawn, start=1)
+    ]  # fmt: skip
     figure.legend(handles=keys, loc="outside lower left", ncols=3, fontsize=7)
     return figure
+
+
+def _draw_detail(ax: Axes, drawn: dict[Contestant, tuple[float, float]]) -> None:
+    """Numbers instead of markers, around the contestants with the smaller errors."""
+    x, y = np.array(list(drawn.values())).T
+    near = y <= DETAIL * y.min()
+    for number, (contestant, (own_x, own_y)) in enumerate(drawn.items(), start=1):
+        if near[number - 1]:
+            colour = FAMILY_COLOURS[contestant.family]
+            ax.plot(own_x, own_y, ".", color=colour, markersize=4)
+            ax.annotate(
+                str(number), (own_x, own_y), xytext=(0, 3 if number % 2 else -9), ha="center",
+                textcoords="offset points", fontsize=7.5, color=colour,
+            )  # fmt: skip
+    margin = 0.1 * (np.ptp(x[near]) or x[near].max())
+    ax.set(
+        xlim=(x[near].min() - margin, x[near].max() + margin),
+        ylim=(0.85 * y.min(), 1.15 * y[near].max()),
+    )
+    ticks = [t for t in (0.5, 1, 1.5, 2, 2.5, 3, 4, 5, 6, 8, 10) if 0.85 * y.min() < t]
+    ticks = [t for t in ticks if t < 1.15 * y[near].max()]
+    ax.set_yticks(ticks, [f"{t:g}" for t in ticks])
+    ax.minorticks_off()
 
 
 def _draw_front(

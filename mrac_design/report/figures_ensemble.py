@@ -17,13 +17,14 @@ from mrac_design.report.style import (
     legend_above,
     new_figure,
     styled,
-    thinned,
 )
 
 MILLI = 1e3
 """From N to mN."""
 _BANDS = 24
 """Intervals of stiffness at most."""
+_POINTS = 600
+"""Points of a line at most."""
 _FAR_OFF = 20
 """Worst run over median from which an axis is logarithmic."""
 _RUNS_A_BAND = 20
@@ -105,9 +106,11 @@ def _scale(errors: FloatArray) -> str:
 
 
 def _exceedance(ax: Axes, errors: FloatArray, label: str, colour: str) -> Line2D:
-    ordered = np.sort(errors)
-    share = 1.0 - np.arange(ordered.size) / ordered.size
-    return ax.plot(*thinned(ordered, share), color=colour, label=label)[0]
+    ordered = np.sort(errors)[::-1]
+    # Ranks spaced like the axis they stand on: the rare runs are what the picture is for.
+    ranks = np.geomspace(1, ordered.size, min(_POINTS, ordered.size)).round().astype(int)
+    ranks = np.unique(ranks)
+    return ax.plot(ordered[ranks - 1], ranks / ordered.size, color=colour, label=label)[0]
 
 
 def _bands(ax: Axes, stiffness: FloatArray, errors: FloatArray, colour: str) -> None:

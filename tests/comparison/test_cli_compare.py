@@ -5,7 +5,7 @@ import json
 import pytest
 from typer.testing import CliRunner
 
-from mrac_design.cli_compare import compare
+from mrac_design.cli.compare import compare
 from mrac_design.errors import ParameterError
 from mrac_design.report import comparison_report
 

@@ -243,7 +243,7 @@ def test_nan_becomes_nan_and_not_full_torque(double):
 
 @pytest.mark.parametrize("name", NUMBERS)
 def test_instruction_count_does_not_depend_on_the_data(packages, tmp_path, name):
-    valgrind = tool("valgrind")
+    valgrind, compiler = tool("valgrind"), tool("cc")
     folder, count = packages[name].directory, packages[name].costs.instructions
     assert count is not None
     calm = (folder / "mrac_selftest_vectors.h").read_text()
@@ -252,7 +252,7 @@ def test_instruction_count_does_not_depend_on_the_data(packages, tmp_path, name)
     rows = "\n".join(f"{{{', '.join(map(NUMBERS[name].literal, row))}}}," for row in wild)
     other = re.sub(r"(test_inputs[^{]*\{).*?\n\};", rf"\g<1>\n{rows}\n}};", calm, flags=re.DOTALL)
     assert other != calm
-    compiler, flags = tool("cc"), ("-O2", "-std=c99", "-ffp-contract=off")
+    flags = ("-O2", "-std=c99", "-ffp-contract=off")
     unit = tmp_path / "controller.o"
     assert command(compiler, *flags, "-c", folder / "mrac_controller.c", "-o", unit).returncode == 0
     (tmp_path / "mrac_selftest_vectors.h").write_text(other)

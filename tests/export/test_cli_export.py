@@ -8,7 +8,7 @@ import pytest
 import typer
 from typer.testing import CliRunner
 
-from mrac_design.cli_export import export
+from mrac_design.cli.export import export
 from mrac_design.errors import MracDesignError
 from mrac_design.export.gains import read_gains
 from tests.export.gain_sets import nominal_gain_set

@@ -9,7 +9,7 @@ import pytest
 import typer
 from typer.testing import CliRunner
 
-from mrac_design.cli_realtime import realtime
+from mrac_design.cli.realtime import realtime
 from mrac_design.errors import FileError, ParameterError
 from mrac_design.simulation.scenario import save_scenario
 from tests.realtime.small_scenario import small_scenario

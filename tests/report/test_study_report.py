@@ -57,7 +57,9 @@ def test_design_panel_notebook_runs(tmp_path):
     pytest.importorskip("ipywidgets")
     path = notebooks_directory() / "04_design_panel.py"
     (notebook,) = execute_notebooks([path], tmp_path, {}, lambda name, done: None)
-    shown = [output.data for cell in notebook.cells for output in cell.get("outputs", [])]
+    outputs = [output for cell in notebook.cells for output in cell.get("outputs", [])]
+    # Streams carry no data: without a compiler the engine says so.
+    shown = [output.data for output in outputs if "data" in output]
     assert any("application/vnd.jupyter.widget-view+json" in data for data in shown)
 
 

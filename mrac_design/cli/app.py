@@ -16,10 +16,12 @@ from rich.logging import RichHandler
 from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn
 from rich.table import Table
 
-from mrac_design.cli_certify import certify, stability, verify
-from mrac_design.cli_export import export
-from mrac_design.cli_options import DesignOptions, StudyOptions, takes
-from mrac_design.cli_realtime import realtime
+from mrac_design.cli.certify import certify, stability, verify
+from mrac_design.cli.compare import compare
+from mrac_design.cli.ensemble import ensemble
+from mrac_design.cli.export import export
+from mrac_design.cli.options import DesignOptions, StudyOptions, takes
+from mrac_design.cli.realtime import realtime
 from mrac_design.errors import MracDesignError
 
 app = typer.Typer(
@@ -178,6 +180,8 @@ app.command()(certify)
 app.command()(verify)
 app.command()(stability)
 app.command()(realtime)
+app.command()(ensemble)
+app.command()(compare)
 
 
 def main() -> None:

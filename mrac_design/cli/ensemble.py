@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 import logging
 import os
+import re
 import sys
 from collections.abc import Iterator
 from contextlib import contextmanager
@@ -23,7 +24,7 @@ from rich.progress import (
 )
 from rich.table import Table
 
-from mrac_design.cli_options import StudyOptions, takes
+from mrac_design.cli.options import StudyOptions, takes
 from mrac_design.errors import EnsembleError, FileError, ParameterError
 
 if TYPE_CHECKING:  # loading them takes longer than `--help` should
@@ -31,6 +32,7 @@ if TYPE_CHECKING:  # loading them takes longer than `--help` should
     from mrac_design.simulation.ensemble import Workers
 
 _output, _messages = Console(), Console(stderr=True)
+_ADDRESS = r"(tcp|tls|wss?|ucx)://.+:\d+"
 _INTERRUPTED = 130
 
 
@@ -115,6 +117,8 @@ def ensemble(
 def _check(workers: int | None, cluster: str | None) -> None:
     if workers is not None and workers < 1:
         raise ParameterError("--workers", workers, "must be at least 1")
+    if cluster not in (None, "local") and not re.fullmatch(_ADDRESS, str(cluster)):
+        raise ParameterError("--cluster", cluster, "must be tcp://host:port, or local")
     if workers is not None and cluster not in (None, "local"):
         raise ParameterError(
             "--workers", workers, f"{cluster} has workers of its own; leave it out"

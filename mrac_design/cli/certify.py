@@ -9,7 +9,7 @@ from typing import Annotated
 
 import typer
 
-from mrac_design.cli_options import DesignOptions, StudyOptions, takes
+from mrac_design.cli.options import DesignOptions, StudyOptions, takes
 
 
 @takes(DesignOptions)

@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 from rich.console import Console
 
-from mrac_design.cli_options import StudyOptions, takes
+from mrac_design.cli.options import StudyOptions, takes
 from mrac_design.errors import ParameterError
 
 if TYPE_CHECKING:  # loading them takes longer than `--help` should

@@ -13,7 +13,7 @@ import typer
 from rich.console import Console
 from rich.table import Table
 
-from mrac_design.cli_options import StudyOptions, takes
+from mrac_design.cli.options import StudyOptions, takes
 from mrac_design.errors import FileError, ParameterError
 
 if TYPE_CHECKING:  # loading them takes longer than `--help` should

@@ -1,0 +1,1 @@
+"""The `mrac` command: one module a group of commands, joined in `app`."""
