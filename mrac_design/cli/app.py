@@ -2,22 +2,18 @@
 
 from __future__ import annotations
 
-import json
 import logging
 import sys
-from collections.abc import Callable, Iterator
-from contextlib import contextmanager
 from pathlib import Path
 from typing import Annotated, Any
 
 import typer
-from rich.console import Console
 from rich.logging import RichHandler
-from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn
 from rich.table import Table
 
 from mrac_design.cli.certify import certify, stability, verify
 from mrac_design.cli.compare import compare
+from mrac_design.cli.console import MESSAGES, OUTPUT, print_json, progress_bar
 from mrac_design.cli.ensemble import ensemble
 from mrac_design.cli.export import export
 from mrac_design.cli.options import DesignOptions, StudyOptions, takes
@@ -31,7 +27,6 @@ app = typer.Typer(
     pretty_exceptions_enable=False,
     rich_markup_mode="rich",
 )
-_output, _messages = Console(), Console(stderr=True)
 
 JsonOption = Annotated[bool, typer.Option("--json", help="Print JSON for machines.")]
 
@@ -43,7 +38,7 @@ def _setup(
     logging.basicConfig(
         level=logging.INFO if verbose else logging.WARNING,
         format="%(message)s",
-        handlers=[RichHandler(console=_messages, show_time=False, show_path=False)],
+        handlers=[RichHandler(console=MESSAGES, show_time=False, show_path=False)],
     )
 
 
@@ -61,14 +56,14 @@ def report(
     from mrac_design.export.values import study_values
     from mrac_design.report.study_report import write_study_report
 
-    with _progress("report") as progress:
+    with progress_bar("report") as progress:
         study = write_study_report(options.chosen(), out, progress=progress)
     values = study_values(study)
     if as_json:
-        _print_json({"out": str(out), **values})
+        print_json({"out": str(out), **values})
     else:
         _print_study(values)
-        _output.print(f"Report: {out / 'report.html'}")
+        OUTPUT.print(f"Report: {out / 'report.html'}")
 
 
 @app.command()
@@ -89,13 +84,13 @@ def simulate(
     from mrac_design.study import run_study
 
     chosen = options.chosen()
-    with _progress("simulation") as progress:
+    with progress_bar("simulation") as progress:
         study = run_study(chosen, progress=lambda fraction: progress("simulating", fraction))
     values = study_values(study)
     if out is not None:
         write_trajectories(study, out)
     if as_json:
-        _print_json(values)
+        print_json(values)
     else:
         _print_study(values)
 
@@ -115,7 +110,7 @@ def design(options: DesignOptions, as_json: JsonOption = False) -> None:
     margins = result.margins()
     poles = [[float(pole.real), float(pole.imag)] for pole in result.closed_loop_poles]
     if as_json:
-        _print_json(
+        print_json(
             {
                 **gains_document(chosen, result),
                 "residual": result.residual,
@@ -127,11 +122,11 @@ def design(options: DesignOptions, as_json: JsonOption = False) -> None:
     table = Table("gain", "value", title=chosen.title)
     for name in ("r1", "s0", "s1", "t0", "t1"):
         table.add_row(name, f"{getattr(result, name):.6g}")
-    _output.print(table)
-    _output.print("closed-loop poles: " + ", ".join(f"{a:.4g}{b:+.4g}j" for a, b in poles))
+    OUTPUT.print(table)
+    OUTPUT.print("closed-loop poles: " + ", ".join(f"{a:.4g}{b:+.4g}j" for a, b in poles))
     for name in margins.__slots__:
-        _output.print(f"{name.replace('_', ' ')}: {getattr(margins, name):.4g}")
-    _output.print(f"relative residual of the Diophantine equation: {result.residual:.2g}")
+        OUTPUT.print(f"{name.replace('_', ' ')}: {getattr(margins, name):.4g}")
+    OUTPUT.print(f"relative residual of the Diophantine equation: {result.residual:.2g}")
 
 
 @app.command("check-model")
@@ -167,12 +162,12 @@ def check_model(
         "gravity_effort_at_home": dynamics.gravity_torque(home, parameters).full().ravel().tolist(),
     }
     if as_json:
-        _print_json(facts)
+        print_json(facts)
         return
     table = Table("fact", "value", title=f"{description.name}: a robot that can exist")
     for name, value in facts.items():
         table.add_row(name.replace("_", " "), _shown(value))
-    _output.print(table)
+    OUTPUT.print(table)
 
 
 app.command()(export)
@@ -189,20 +184,11 @@ def main() -> None:
     try:
         app(standalone_mode=True)
     except MracDesignError as problem:
-        _messages.print(f"[bold red]error:[/] {_escaped(str(problem))}", soft_wrap=True)
+        MESSAGES.print(f"[bold red]error:[/] {_escaped(str(problem))}", soft_wrap=True)
         sys.exit(2)
     except KeyboardInterrupt:
-        _messages.print("interrupted; nothing half-written was left behind")
+        MESSAGES.print("interrupted; nothing half-written was left behind")
         sys.exit(130)
-
-
-@contextmanager
-def _progress(title: str) -> Iterator[Callable[[str, float], None]]:
-    """A progress bar on the error stream, so that standard output stays for results."""
-    columns = TextColumn("{task.description}"), BarColumn(), TimeElapsedColumn()
-    with Progress(*columns, console=_messages, transient=True) as bar:
-        task = bar.add_task(title, total=1.0)
-        yield lambda message, fraction: bar.update(task, description=message, completed=fraction)
 
 
 def _print_study(values: dict[str, Any]) -> None:
@@ -218,15 +204,11 @@ def _print_study(values: dict[str, Any]) -> None:
                 f"{1e3 * metrics['max_model_error_N']:.3g}",
                 f"{1e3 * metrics['rms_model_error_N']:.3g}",
             )
-    _output.print(table)
+    OUTPUT.print(table)
     for variant, peaks in values["max_torque_Nm"].items():
         shown = ", ".join(f"{motor} {peak:.3g}" for motor, peak in peaks.items())
-        _output.print(f"largest torques (N·m), {variant}: {shown}")
-    _output.print(f"ran on {values['engine']}")
-
-
-def _print_json(content: dict[str, Any]) -> None:
-    sys.stdout.write(json.dumps(content, indent=2, ensure_ascii=False) + "\n")
+        OUTPUT.print(f"largest torques (N·m), {variant}: {shown}")
+    OUTPUT.print(f"ran on {values['engine']}")
 
 
 def _shown(value: object) -> str:

@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-import json
 import sys
 from pathlib import Path
 from typing import Annotated
 
 import typer
 
+from mrac_design.cli.console import print_json, progress_bar
 from mrac_design.cli.options import DesignOptions, StudyOptions, takes
 
 
@@ -94,19 +94,17 @@ def stability(
 
     Example: mrac stability --out reports/stability
     """
-    from rich.console import Console
-
     from mrac_design.report.stability_report import write_stability_report
 
-    with Console(stderr=True).status("starting") as status:
+    with progress_bar("stability") as progress:
         report = write_stability_report(
             options.chosen(),
             out,
             choices=choices,
-            progress=lambda message, fraction: status.update(f"{message}, {100 * fraction:.0f} %"),
+            progress=progress,
         )
     if as_json:
-        typer.echo(json.dumps(report.values, indent=2, ensure_ascii=False))
+        print_json(report.values)
         return
     typer.echo(f"asymptotic stability by the feedforward theorem: {report.values['theorem_5_9']}")
     for title, found in report.values["designs"].items():

@@ -2,22 +2,18 @@
 
 from __future__ import annotations
 
-import json
-import sys
 from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
 import typer
-from rich.console import Console
-from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn
 from rich.table import Table
+
+from mrac_design.cli.console import OUTPUT, print_json, progress_bar
 
 if TYPE_CHECKING:  # loading them takes longer than `--help` should
     from mrac_design.comparison import Comparison, ComparisonSpecification
     from mrac_design.simulation.scenario import MotionChoice
-
-_output, _messages = Console(), Console(stderr=True)
 
 
 def compare(
@@ -60,23 +56,17 @@ def compare(
     comparison = _written(specification, out)
     if as_json:
         values = {"out": str(out), **comparison_values(comparison)}
-        sys.stdout.write(json.dumps(values, indent=2, ensure_ascii=False) + "\n")
+        print_json(values)
     else:
         _print(comparison)
-        _output.print(f"Report: {out / 'report.html'}", soft_wrap=True)
+        OUTPUT.print(f"Report: {out / 'report.html'}", soft_wrap=True)
 
 
 def _written(specification: ComparisonSpecification, out: Path) -> Comparison:
     from mrac_design.report.comparison_report import write_comparison_report
 
-    columns = TextColumn("{task.description}"), BarColumn(), TimeElapsedColumn()
-    with Progress(*columns, console=_messages, transient=True) as bar:
-        task = bar.add_task("comparison", total=1.0)
-        return write_comparison_report(
-            specification,
-            out,
-            progress=lambda message, share: bar.update(task, description=message, completed=share),
-        )
+    with progress_bar("comparison") as progress:
+        return write_comparison_report(specification, out, progress=progress)
 
 
 def _motion(
@@ -110,12 +100,12 @@ def _print(comparison: Comparison) -> None:
         table.add_row(contestant.title, *cells, *noise)
     limits = [f"{1e3 * comparison.limits[c.name].error:.2f}" for c in (first, second)]
     table.add_row("limit of linear control", *limits, "", "")
-    _output.print(table)
+    OUTPUT.print(table)
     for sentence in findings(comparison):
-        _output.print(sentence.replace("**", ""), markup=False, highlight=False)
+        OUTPUT.print(sentence.replace("**", ""), markup=False, highlight=False)
     for claim in claims(comparison):
         verdict = "met" if claim.met else "NOT MET"
-        _output.print(
+        OUTPUT.print(
             f"{verdict}: {claim.text}: {claim.value} (wanted {claim.bound})",
             markup=False,
             highlight=False,

@@ -2,28 +2,20 @@
 
 from __future__ import annotations
 
-import json
 import logging
 import os
 import re
 import sys
 from collections.abc import Iterator
 from contextlib import contextmanager
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
-from rich.console import Console
-from rich.progress import (
-    BarColumn,
-    Progress,
-    TaskProgressColumn,
-    TextColumn,
-    TimeElapsedColumn,
-    TimeRemainingColumn,
-)
 from rich.table import Table
 
+from mrac_design.cli.console import MESSAGES, OUTPUT, json_text, progress_bar
 from mrac_design.cli.options import StudyOptions, takes
 from mrac_design.errors import EnsembleError, FileError, ParameterError
 
@@ -31,7 +23,6 @@ if TYPE_CHECKING:  # loading them takes longer than `--help` should
     from mrac_design.ensemble_study import EnsembleRecord
     from mrac_design.simulation.ensemble import Workers
 
-_output, _messages = Console(), Console(stderr=True)
 _ADDRESS = r"(tcp|tls|wss?|ucx)://.+:\d+"
 _INTERRUPTED = 130
 
@@ -95,12 +86,12 @@ def ensemble(
         inertia_spread=inertia_spread, motion_seeds=motion_seeds, variant=variant, step=step,
     )  # fmt: skip
     try:
-        with _bar(runs) as bar, _workers(workers, cluster) as hands:
+        with progress_bar(f"{runs} runs") as bar, _workers(workers, cluster) as hands:
             record = run_prepared(
                 prepare_ensemble(options.chosen(), choice),
                 workers=hands,
                 store=None if store is None else EnsembleStore(store),
-                progress=bar,
+                progress=partial(bar, f"{runs} runs"),
             )
     except KeyboardInterrupt:
         _say_interrupted(store)
@@ -109,7 +100,7 @@ def ensemble(
     if out is not None:
         _write(record, values, out)
     if as_json:
-        sys.stdout.write(_as_json(values))
+        sys.stdout.write(json_text(values))
     else:
         _print(record, values)
 
@@ -152,23 +143,8 @@ def _workers(count: int | None, cluster: str | None) -> Iterator[Workers]:
             yield DaskCluster(address=own.scheduler_address)
 
 
-@contextmanager
-def _bar(runs: int) -> Iterator[Any]:
-    """A progress bar on the error stream, so that standard output stays for results."""
-    columns = (
-        TextColumn("{task.description}"),
-        BarColumn(),
-        TaskProgressColumn(),
-        TimeElapsedColumn(),
-        TimeRemainingColumn(),
-    )
-    with Progress(*columns, console=_messages, transient=True) as bar:
-        task = bar.add_task(f"{runs} runs", total=1.0)
-        yield lambda fraction: bar.update(task, completed=fraction)
-
-
 def _say_interrupted(store: Path | None) -> None:
-    _messages.print(
+    MESSAGES.print(
         "interrupted; nothing was kept: with --store DIR finished runs stay there"
         if store is None
         else f"interrupted; finished runs are kept in {store}: give the same command to go on",
@@ -183,7 +159,7 @@ def _write(record: EnsembleRecord, values: dict[str, Any], out: Path) -> None:
 
     try:
         with staging_folder(out) as staging:
-            (staging / "summary.json").write_text(_as_json(values), encoding="utf-8")
+            (staging / "summary.json").write_text(json_text(values), encoding="utf-8")
             record.save_runs(staging / "runs.npz")
             for name in ("summary.json", "runs.npz"):
                 publish_file(staging / name, out / name)
@@ -192,10 +168,6 @@ def _write(record: EnsembleRecord, values: dict[str, Any], out: Path) -> None:
         raise FileError(
             out, "", f"the results cannot be written: {problem.strerror or problem}"
         ) from problem
-
-
-def _as_json(values: dict[str, Any]) -> str:
-    return json.dumps(values, indent=2, ensure_ascii=False) + "\n"
 
 
 def _print(record: EnsembleRecord, values: dict[str, Any]) -> None:
@@ -207,7 +179,7 @@ def _print(record: EnsembleRecord, values: dict[str, Any]) -> None:
     for name, text in (("max_force_error_N", "max |y − Fd|"), ("rms_force_error_N", "rms y − Fd")):
         for axis, spread in metrics[name].items():
             table.add_row(text, axis, *(f"{1e3 * value:.3g}" for value in spread.values()))
-    _output.print(table)
+    OUTPUT.print(table)
     drawn, ensemble = values["drawn"], record.prepared.ensemble
     gain = drawn["adaptation_gain"]
     low, high = drawn["stiffness_N_per_m"]
@@ -228,4 +200,4 @@ def _print(record: EnsembleRecord, values: dict[str, Any]) -> None:
 
 
 def _say(text: str) -> None:
-    _output.print(text, highlight=False, soft_wrap=True, markup=False)
+    OUTPUT.print(text, highlight=False, soft_wrap=True, markup=False)

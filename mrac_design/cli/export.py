@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import json
-import sys
 from collections.abc import Mapping
 from dataclasses import fields
 from enum import Enum
@@ -11,8 +9,8 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
 import typer
-from rich.console import Console
 
+from mrac_design.cli.console import OUTPUT, print_json
 from mrac_design.cli.options import StudyOptions, takes
 from mrac_design.errors import ParameterError
 
@@ -20,7 +18,6 @@ if TYPE_CHECKING:  # loading them takes longer than `--help` should
     from mrac_design.controller.robot_step import RobotStep
     from mrac_design.export.gains import GainSet
 
-_output = Console()
 
 Summary = Mapping[str, str | float | None]
 
@@ -167,12 +164,12 @@ def _write_gains(tuned: GainSet, path: Path) -> Summary:
 
 def _print(done: Mapping[str, Summary], as_json: bool) -> None:
     if as_json:
-        sys.stdout.write(json.dumps(done, indent=2, ensure_ascii=False) + "\n")
+        print_json(done)
         return
     for what, summary in done.items():
-        _output.print(what, style="bold", highlight=False)
+        OUTPUT.print(what, style="bold", highlight=False)
         for name, value in summary.items():
-            _output.print(
+            OUTPUT.print(
                 f"  {name.replace('_', ' ')}: {value}",
                 highlight=False,
                 soft_wrap=True,

@@ -2,24 +2,21 @@
 
 from __future__ import annotations
 
-import json
-import sys
 from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
 import typer
-from rich.console import Console
 from rich.table import Table
 
+from mrac_design.cli.console import MESSAGES, OUTPUT, json_text, print_json
 from mrac_design.cli.options import StudyOptions, takes
 from mrac_design.errors import FileError, ParameterError
 
 if TYPE_CHECKING:  # loading them takes longer than `--help` should
     from mrac_design.realtime import RealtimeReport, RealtimeRun
 
-_output, _messages = Console(), Console(stderr=True)
 _DURATION = 2.0
 
 
@@ -52,7 +49,7 @@ def realtime(
     base = replace(options, duration=None).chosen()
     duration = _DURATION if options.duration is None else options.duration
     scenario = replace(base, simulation=replace(base.simulation, duration=duration, settling=0.0))
-    with _messages.status("real time") as status:
+    with MESSAGES.status("real time") as status:
         report = run_realtime(
             scenario,
             rates=wanted,
@@ -62,7 +59,7 @@ def realtime(
     if out is not None:
         _write(report, out)
     if as_json:
-        sys.stdout.write(_as_json(report))
+        print_json(report.values())
     else:
         _print(report)
 
@@ -82,17 +79,13 @@ def _write(report: RealtimeReport, out: Path) -> None:
 
     try:
         with staging_folder(out) as staging:
-            (staging / "realtime.json").write_text(_as_json(report), encoding="utf-8")
+            (staging / "realtime.json").write_text(json_text(report.values()), "utf-8")
             publish_file(staging / "realtime.json", out / "realtime.json")
         save_latency_figure(report, out)
     except OSError as problem:
         raise FileError(
             out, "", f"the results cannot be written: {problem.strerror or problem}"
         ) from problem
-
-
-def _as_json(report: RealtimeReport) -> str:
-    return json.dumps(report.values(), indent=2, ensure_ascii=False) + "\n"
 
 
 def _print(report: RealtimeReport) -> None:
@@ -104,7 +97,7 @@ def _print(report: RealtimeReport) -> None:
     for run in report.runs:
         _add_rows(table, run)
         table.add_section()
-    _output.print(table)
+    OUTPUT.print(table)
     for run in report.runs:
         _say(f"{run.rate:g} Hz: torques against the simulation's: {run.agreement}")
         _say(f"    {_conditions(run)}")
@@ -146,4 +139,4 @@ def _cost(run: RealtimeRun) -> str:
 
 
 def _say(text: str) -> None:
-    _output.print(text, highlight=False, soft_wrap=True, markup=False)
+    OUTPUT.print(text, highlight=False, soft_wrap=True, markup=False)

@@ -73,7 +73,7 @@ def test_infinite_memory_gains_little(setting, spectrum):
 
 def test_a_controller_reaches_it(setting, spectrum):
     """The optimal command, computed from past readings alone, in a plain loop."""
-    count, memory = 20_000, 200
+    count, memory = 15_000, 200
     limit = linear_limit(spectrum, setting, memory=memory)
     random = np.random.default_rng(1)
     motion = spectrum.realisation(PERIOD * np.arange(count), seed=3)[0]
@@ -92,7 +92,7 @@ def test_a_controller_reaches_it(setting, spectrum):
         command = (wanted - (F @ ahead)[0]) / g[0]
         x, pending = ahead, command
     rms = np.sqrt(np.mean(force[2000:] ** 2))
-    # 18 s hold some tens of independent stretches of the motion.
+    # 13 s hold some tens of independent stretches of the motion.
     assert rms == pytest.approx(limit.error, rel=0.1)
 
 
