@@ -63,6 +63,10 @@ class TuningParameter:
             )
 
 
+LEAD = TuningParameter(name="lead", unit="s", low=1e-4, high=5e-3, start=1.5e-3)
+"""The lead as the tuner sees it: every contestant with a model's inverse may choose it."""
+
+
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class TunedAxis:
     """A controller with the velocity loop it stands on."""

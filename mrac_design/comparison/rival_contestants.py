@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from mrac_design.arrays import FloatArray
 from mrac_design.comparison.contestant import (
+    LEAD,
     Build,
     Contestant,
     Family,
@@ -11,8 +12,8 @@ from mrac_design.comparison.contestant import (
     TunedAxis,
     TuningParameter,
 )
-from mrac_design.comparison.leading_inverse import LEAD, LeadingInverse
 from mrac_design.comparison.setting import AxisSetting
+from mrac_design.controller.reference import LeadingInverse
 from mrac_design.controller.rivals.active_observer import (
     ActiveObserver,
     ObserverTuning,

@@ -6,6 +6,7 @@ from dataclasses import replace
 
 from mrac_design.arrays import FloatArray
 from mrac_design.comparison.contestant import (
+    LEAD,
     Build,
     Contestant,
     Family,
@@ -14,13 +15,12 @@ from mrac_design.comparison.contestant import (
     TunedAxis,
     TuningParameter,
 )
-from mrac_design.comparison.disturbance_observer import with_disturbance_observer
-from mrac_design.comparison.leading_inverse import LEAD, LeadingInverse
 from mrac_design.comparison.setting import AxisSetting
 from mrac_design.controller.adaptation import AdaptationLaw, NormalisedGradientLaw
 from mrac_design.controller.adaptive import GAIN_NAMES, AdaptiveRST, build_step, nominal_gains
+from mrac_design.controller.disturbance_observer import with_disturbance_observer
 from mrac_design.controller.oscillator import Oscillator
-from mrac_design.controller.reference import DirectReference, ReferenceFeedforward
+from mrac_design.controller.reference import DirectReference, LeadingInverse, ReferenceFeedforward
 from mrac_design.controller.rivals.linear import build_linear_step
 from mrac_design.controller.rivals.rst_integral import IntegralRST, integral_rst
 from mrac_design.controller.robust import GainBox, WithProjection

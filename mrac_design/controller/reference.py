@@ -6,6 +6,7 @@ from dataclasses import dataclass
 from typing import Protocol
 
 from mrac_design.design import ReferenceModel
+from mrac_design.errors import ParameterError
 
 
 class ReferenceFeedforward(Protocol):
@@ -32,3 +33,24 @@ class ModelInverse:
 
     def weights(self, model: ReferenceModel) -> tuple[float, float]:
         return 2 * model.damping / model.bandwidth, 1 / model.bandwidth**2
+
+
+@dataclass(frozen=True, slots=True)
+class LeadingInverse:
+    """u_c = (1 + 2ξp/ω + p²/ω²) e^{pλ} Fd, to the second derivative of Fd.
+
+    A sampled loop with dead time answers about λ = (delay + ½) periods later than the model it
+    was designed with; λ = 0 is the plain inverse of the model.
+    """
+
+    lead: float
+    """λ (s), ≥ 0."""
+
+    def __post_init__(self) -> None:
+        if not 0 <= self.lead < float("inf"):
+            raise ParameterError("lead", self.lead, "must be a finite time >= 0 s")
+
+    def weights(self, model: ReferenceModel) -> tuple[float, float]:
+        """(c1 in s, c2 in s²) of u_c = Fd + c1 Ḟd + c2 F̈d."""
+        first, second = 2 * model.damping / model.bandwidth, 1 / model.bandwidth**2
+        return first + self.lead, second + first * self.lead + self.lead**2 / 2

@@ -5,9 +5,8 @@ import pytest
 from scipy.linalg import expm
 
 from mrac_design.comparison.comparison import contestants
-from mrac_design.comparison.disturbance_observer import with_disturbance_observer
-from mrac_design.comparison.leading_inverse import LeadingInverse
-from mrac_design.controller.reference import ModelInverse
+from mrac_design.controller.disturbance_observer import with_disturbance_observer
+from mrac_design.controller.reference import LeadingInverse, ModelInverse
 from mrac_design.design import ReferenceModel
 from mrac_design.errors import ParameterError
 
