@@ -20,7 +20,7 @@ from mrac_design.motion import HeartMotion, available_motions, load_motion, read
 from mrac_design.motion.signal import PiecewisePolynomial
 from mrac_design.plant import ForcePlant
 from mrac_design.robot import RobotDescription, RobotDynamics, build_dynamics, load_robot
-from mrac_design.robot.posture import condition_numbers
+from mrac_design.robot.posture import check_posture, condition_numbers
 from mrac_design.simulation.engine import Engine
 from mrac_design.simulation.run import Progress
 from mrac_design.simulation.scenario import Scenario
@@ -104,6 +104,15 @@ def run_study(scenario: Scenario, progress: Progress | None = None) -> StudyReco
         max_torque={name: max_torque(run_) for name, run_ in trajectories.items()},
         worst_condition=_worst_condition(scenario, dynamics, trajectories),
     )
+
+
+def check_scenario(scenario: Scenario) -> None:
+    """Raise what `run_study` would raise for the scenario's files and numbers, without running."""
+    robot = load_robot(scenario.robot)
+    _check_axes(scenario, robot)
+    scenario_motion(scenario)
+    scenario_design(scenario)
+    check_posture(build_dynamics(robot), robot.home, scenario.simulation.condition_limit)
 
 
 def scenario_motion(scenario: Scenario) -> HeartMotion:

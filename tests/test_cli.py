@@ -127,6 +127,20 @@ def test_a_missing_recording_is_one_clear_error(mrac, tmp_path):
     )
 
 
+@pytest.mark.parametrize(
+    ("arguments", "names"),
+    [
+        (("compare", "--motion", "nowhere.csv"), "nowhere.csv"),
+        (("stability", "--motion", "nowhere.csv"), "nowhere.csv"),
+        (("stability", "--k2", "-1"), "velocity gain K2 = -1"),
+    ],
+)
+def test_the_long_commands_refuse_before_they_start(mrac, tmp_path, arguments, names):
+    out = tmp_path / "out"
+    error = _refused(mrac, out, *arguments, "--out", str(out), names=names)
+    assert "cell" not in error  # told by the command, not by a notebook of the report
+
+
 ROBOT = (models_directory() / "robots" / "d2m2_set_a.toml").read_text("utf-8")
 BAD_ROBOTS = {
     "negative mass": (re.sub(r"mass = 18\.0+", "mass = -18.0", ROBOT), "mass"),
@@ -173,7 +187,7 @@ def test_a_bad_number_is_one_clear_error(mrac, tmp_path, option, value, names):
     _refused(mrac, out, "simulate", option, value, "--out", str(out), names=names)
 
 
-def _refused(mrac, out, *arguments: str, names: str) -> None:
+def _refused(mrac, out, *arguments: str, names: str) -> str:
     status, text, error = mrac(*arguments)
     assert status == 2, (text, error)
     assert text == ""
@@ -182,3 +196,4 @@ def _refused(mrac, out, *arguments: str, names: str) -> None:
     assert names in error.replace("\n", "")
     assert not out.exists()
     assert not list(out.parent.glob(".mrac-*"))
+    return error

@@ -180,6 +180,7 @@ def run_comparison(
     `workers` processes run at a time, one a core unless given. Raises MotionFileError for a
     motion that cannot be used.
     """
+    conditions = _conditions(specification)  # a motion that cannot be used is told at once
     chosen = specification.contestants
     prints = {contestant.name: specification.fingerprint(contestant) for contestant in chosen}
     entries: dict[str, Entry] = {}
@@ -195,7 +196,6 @@ def run_comparison(
     ):
         store.write(contestant.name, prints[contestant.name], entry)
         entries[contestant.name] = entry
-    conditions = _conditions(specification)
     return Comparison(
         specification=specification,
         conditions=conditions,

@@ -17,6 +17,7 @@ from mrac_design.report.rendering import ReportProgress, ignore_progress, render
 from mrac_design.report.study_report import with_absolute_paths
 from mrac_design.resources import notebooks_directory
 from mrac_design.simulation.scenario import Scenario, save_scenario
+from mrac_design.study import check_scenario
 from mrac_design.verify import verify_certificate
 
 STABILITY_NOTEBOOKS = ("05_stability.py",)
@@ -56,7 +57,9 @@ def write_stability_report(
     by the code that knows no solver. Raises what `render_report` raises, and CertificateError when
     a certificate is refused.
     """
-    load_choices(choices)  # a mistake in the file is told before anything is run
+    # A mistake in either file is told before anything is run.
+    load_choices(choices)
+    check_scenario(scenario)
     with staging_folder(out) as folder:
         save_scenario(with_absolute_paths(scenario), folder / "scenario.toml")
         shutil.copyfile(choices_path(choices), folder / "stability.toml")

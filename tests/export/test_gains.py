@@ -35,12 +35,12 @@ from mrac_design.export.gains import (
     robot_step_of,
     write_gains,
 )
-from mrac_design.export.scenario_step import scenario_robot_step
 from mrac_design.resources import models_directory
 from mrac_design.simulation.scenario import load_scenario
 from mrac_design.study import VARIANTS, scenario_design, variant_controller
 from mrac_design.time_domain import Continuous, Discrete
 from tests.export.gain_sets import gain_sets, nominal_gain_set
+from tests.export.scenario_step import scenario_robot_step
 
 SUFFIXES = (".json", ".toml", ".yaml", ".yml", ".mat")
 
