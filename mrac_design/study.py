@@ -13,7 +13,7 @@ from mrac_design.arrays import readonly
 from mrac_design.controller.adaptive import AdaptiveRST, build_step, nominal_gains
 from mrac_design.controller.linearisation import build_linearisation, home_task_position
 from mrac_design.controller.reference import DirectReference, ModelInverse, ReferenceFeedforward
-from mrac_design.design import ReferenceModel, RSTDesign, RSTSpecification, design_rst
+from mrac_design.design import RSTDesign, design_rst
 from mrac_design.errors import ScenarioFileError
 from mrac_design.metrics.tracking import TrackingMetrics, max_torque, tracking_metrics
 from mrac_design.motion import HeartMotion, available_motions, load_motion, read_recorded_motion
@@ -131,14 +131,7 @@ def scenario_motion(scenario: Scenario) -> HeartMotion:
 
 def scenario_design(scenario: Scenario) -> RSTDesign:
     """The scenario's RST design."""
-    choice = scenario.design
-    return design_rst(
-        RSTSpecification(
-            plant=ForcePlant(stiffness=choice.stiffness, velocity_gain=choice.velocity_gain),
-            reference_model=ReferenceModel(bandwidth=choice.bandwidth, damping=choice.damping),
-            observer_pole=choice.observer_pole,
-        )
-    )
+    return design_rst(scenario.design.specification)
 
 
 def variant_controller(scenario: Scenario, design: RSTDesign, variant: Variant) -> AdaptiveRST:

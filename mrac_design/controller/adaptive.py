@@ -1,15 +1,18 @@
 r"""The adaptive RST controller of one force axis.
 
-    r ─► pre-filter ─► F_d ─► feedforward ─► u_c ─┬─► 1/Ao ─► xc ─► 1/Am ─► zc ─┐
-                                                  └─► reference model ─► y_m     ├─► φ
-              y ──────────────────────────────────┬─► 1/Ao ─► xy ─► 1/Am ─► zy ──┤
-              u ──────────────────────────────────┴─► 1/Ao ─► xu ─► 1/Am ─► zu ──┘
+    r ─► pre-filter ─► F_d ─► feedforward ─► u_c ─┬─► 1/Ao ─► 1/Am ─┐
+                                                  └─► reference model ─► y_m
+              y ──────────────────────────────────┬─► 1/Ao ─► 1/Am ─┤─► φ
+              u ──────────────────────────────────┴─► 1/Ao ─► 1/Am ─┘
 
-    u = −θᵀ(P1 φ)      ε = (y − y_m) + b0 η      η = −((1/P1) u + φᵀ θ)      dθ/dt = law(φ, ε)
+    u = −(K/Ao) u − θᵀ(P1 φ)      ε = (y − y_m) + b0 η      η = −((p + c) D/(P1 Ao) u + φᵀ θ)
+    dθ/dt = law(φ, ε)
 
-with Q = Ao Am, P1 = Am, P2 = Ao, so P1 φ needs the first-order filters only and there is no
-algebraic loop ([AW] section 5.8, Example 5.14). θ = (r1 − ao, s0, s1, t0, t1) and, if wanted, a
-constant bias force. With the gain at zero this *is* the frozen RST controller.
+with Q = Ao Am, P1 = Am, P2 = Ao, so P1 φ needs the filters 1/Ao only and there is no algebraic
+loop ([AW] section 5.8, Example 5.14). D is the internal model in R = (p + r1) D, c chosen so that
+K = (p + c) D − Ao has no power above the (n − 2)nd, n = deg Ao; without internal model c = ao and
+K = 0, which is [AW 5.71]. θ = (r1 − c, s0 … sn, t0 … tn) and, if wanted, a constant bias force.
+With the gain at zero this *is* the frozen RST controller.
 """
 
 from __future__ import annotations
@@ -25,6 +28,7 @@ from mrac_design.arrays import FloatArray, readonly
 from mrac_design.controller.adaptation import AdaptationLaw, AdaptationSignals
 from mrac_design.controller.advance import integral_advance, linear_advance
 from mrac_design.controller.assembly import StepSymbols, assemble_step
+from mrac_design.controller.filter_chains import FilterChain, chain_equations, settled
 from mrac_design.controller.oscillator import (
     HarmonicSignals,
     Oscillator,
@@ -34,24 +38,13 @@ from mrac_design.controller.oscillator import (
 )
 from mrac_design.controller.reference import ReferenceFeedforward
 from mrac_design.controller.step import ControllerStep
-from mrac_design.design import ReferenceModel, RSTDesign
+from mrac_design.design import ReferenceModel, RSTDesign, RSTSpecification
 from mrac_design.errors import ParameterError
 from mrac_design.layout import Layout
 from mrac_design.time_domain import Discrete, TimeDomain
 
-GAIN_NAMES = ("r1'", "s0", "s1", "t0", "t1", "bias")
-"""Entries of the gain vector, in order; r1' = r1 − ao is what adapts [AW 5.71]."""
-
-_STATE = Layout(
-    (
-        ("filtered_command", 3),
-        ("filtered_force", 3),
-        ("filtered_reference", 3),
-        ("gains", len(GAIN_NAMES)),
-        ("model", 2),
-        ("prefilter", 2),
-    )
-)
+BIAS = "bias"
+"""Name of the gain vector's last entry; `RSTSpecification.gain_names` are the others."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -69,21 +62,28 @@ class AdaptiveRST:
     bias_force: float
     """Size of the constant regressor (N); 0 leaves the bias out."""
     initial_gains: tuple[float, ...]
-    """Scaled gains at the start, θ̂(0) = D⁻¹θ(0), 5 values; the design's own are `nominal_gains`."""
+    """Scaled gains at the start, θ̂(0) = D⁻¹θ(0), one for each of the design's; its own are
+    `nominal_gains`."""
     time_domain: TimeDomain
     """Continuous, or sampled with a period."""
     oscillator: Oscillator | None = None
     """Harmonics of a periodic motion as further regressors; none leaves them out."""
 
     def __post_init__(self) -> None:
-        if len(self.initial_gains) != 5 or not np.all(np.isfinite(self.initial_gains)):
+        names = self.design.specification.gain_names
+        if len(self.initial_gains) != len(names) or not np.all(np.isfinite(self.initial_gains)):
             raise ParameterError(
                 "initial gains",
                 self.initial_gains,
-                "needs five finite numbers (r1', s0, s1, t0, t1)",
+                f"needs {len(names)} finite numbers ({', '.join(names)})",
             )
         if not 0 <= self.bias_force < float("inf"):
             raise ParameterError("bias force", self.bias_force, "must be a finite force >= 0 N")
+
+    @property
+    def gain_names(self) -> tuple[str, ...]:
+        """Entries of the adapted gains, in order."""
+        return (*self.design.specification.gain_names, BIAS)
 
 
 def nominal_gains(design: RSTDesign) -> tuple[float, ...]:
@@ -103,18 +103,36 @@ def build_step(controller: AdaptiveRST) -> ControllerStep:
     reference_signal = _reference_path(state, symbols, reference)
     harmonic = _harmonic_signals(controller, state, symbols)
     scaling = _joined(symbols, "scaling", "harmonic_scaling")
+    chains = {name: _chain(state, symbols, name) for name in _CHAINS}
+    command_powers = chains["filtered_command"].before_model(ca.SX(0))[1:]
     coarse = ca.vertcat(
-        _filtered_signals(state, symbols, force, reference_signal.input), harmonic.coarse
+        ca.dot(symbols["internal_model"], command_powers),
+        chains["filtered_force"].before_model(force),
+        -chains["filtered_reference"].before_model(reference_signal.input),
+        1 / _static(symbols),
+        harmonic.coarse,
     )
     law = controller.law
     moving = _joined(state, "gains", "harmonic_gains")
     gains = law.confined(symbols, moving)
     command = -ca.dot(scaling * gains, coarse)
+    if "known" in symbols:
+        command -= ca.dot(symbols["known"], command_powers[1:])
 
-    filtered = ca.vertcat(_regressor(state, symbols), harmonic.regressor)
+    slow_command = chains["filtered_command"].after_model()
+    modelled = ca.dot(symbols["internal_model"], slow_command[1:])
+    filtered = ca.vertcat(
+        modelled,
+        chains["filtered_force"].after_model(),
+        -chains["filtered_reference"].after_model(),
+        1 / (_static(symbols) * symbols["model_polynomial"][1]),
+        harmonic.regressor,
+    )
     regressor = symbols["b0"] * scaling * filtered
-    command_over_p1 = state["filtered_command"][1] + symbols["ao"] * state["filtered_command"][2]
-    augmentation = -(symbols["b0"] * command_over_p1 + ca.dot(regressor, gains))
+    driven = ca.dot(symbols["internal_model"], slow_command[:-1])
+    augmentation = -(
+        symbols["b0"] * (driven + symbols["adapted_pole"] * modelled) + ca.dot(regressor, gains)
+    )
     error = force - state["model"][1] + augmentation
     rate = law.rate(
         symbols,
@@ -124,17 +142,18 @@ def build_step(controller: AdaptiveRST) -> ControllerStep:
     )
 
     advanced = _advanced_gains(controller, symbols, moving, rate)
-    own = len(GAIN_NAMES)
+    own = len(controller.gain_names)
     return assemble_step(
         step,
         values=parameters.pack(values),
         command=command,
         following={
-            "filtered_command": _filter(symbols, state["filtered_command"], step.applied),
-            "filtered_force": _filter(symbols, state["filtered_force"], force),
-            "filtered_reference": _filter(
-                symbols, state["filtered_reference"], reference_signal.input
-            ),
+            **{
+                name: _filter(symbols, state[name], signal)
+                for name, signal in zip(
+                    _CHAINS, (step.applied, force, reference_signal.input), strict=True
+                )
+            },
             "gains": advanced[:own],
             "model": _second_order_step(symbols, "model", state["model"], reference_signal.input),
             "prefilter": _second_order_step(symbols, "prefilter", state["prefilter"], reference),
@@ -151,11 +170,33 @@ def build_step(controller: AdaptiveRST) -> ControllerStep:
     )
 
 
+_CHAINS = ("filtered_command", "filtered_force", "filtered_reference")
+
+
 def _layout(controller: AdaptiveRST) -> Layout:
     """State, with that of the oscillator if there is one."""
-    if controller.oscillator is None:
-        return _STATE
-    return Layout((*_STATE.blocks, *controller.oscillator.blocks))
+    order = controller.design.specification.degree + 2
+    oscillator = controller.oscillator
+    return Layout(
+        (
+            *((name, order) for name in _CHAINS),
+            ("gains", len(controller.gain_names)),
+            ("model", 2),
+            ("prefilter", 2),
+            *(() if oscillator is None else oscillator.blocks),
+        )
+    )
+
+
+def _chain(state: Mapping[str, ca.SX], symbols: Mapping[str, ca.SX], name: str) -> FilterChain:
+    return FilterChain(
+        states=state[name], observer=symbols["observer"], model=symbols["model_polynomial"]
+    )
+
+
+def _static(symbols: Mapping[str, ca.SX]) -> ca.SX:
+    """Ao(0), what a constant is divided by on its way through 1/Ao."""
+    return symbols["observer"][-1]
 
 
 def _joined(blocks: Mapping[str, ca.SX], first: str, second: str) -> ca.SX:
@@ -169,7 +210,10 @@ def _harmonic_signals(
     if controller.oscillator is None:
         return HarmonicSignals(ca.SX(0, 1), ca.SX(0, 1))
     return harmonic_signals(
-        controller.oscillator, symbols, state["oscillator"], symbols["model_damping"]
+        controller.oscillator,
+        state["oscillator"],
+        static=_static(symbols),
+        model=symbols["model_polynomial"],
     )
 
 
@@ -183,7 +227,7 @@ def _oscillator_following(
 ) -> Mapping[str, ca.SX]:
     if controller.oscillator is None:
         return {}
-    own = len(GAIN_NAMES)
+    own = len(controller.gain_names)
     return {
         "harmonic_gains": advanced[own:],
         "oscillator": oscillator_advance(
@@ -208,18 +252,21 @@ def _advanced_gains(
 
 def _parameter_values(controller: AdaptiveRST) -> Mapping[str, FloatArray]:
     specification = controller.design.specification
-    model, ao = specification.reference_model, specification.observer_pole
+    model, b0 = specification.reference_model, specification.plant.b0
     domain = controller.time_domain
-    filter_A, filter_B = linear_advance(domain, *_regressor_filter(model, ao))
+    filter_A, filter_B = linear_advance(domain, *chain_equations(specification))
     model_A, model_B = linear_advance(domain, *_second_order(model))
     c1, c2 = controller.feedforward.weights(model)
     # The bias enters like a constant that has passed 1/(Ao Am): its scaled regressor is a force.
-    bias_scale = ao * model.bandwidth**2 / specification.plant.b0 * controller.bias_force
+    unit_force = specification.observer[-1] * model.bandwidth**2 / b0
     values: dict[str, Any] = {
         "bandwidth": model.bandwidth,
-        "ao": ao,
-        "b0": specification.plant.b0,
-        "scaling": np.append(controller.design.scaling, bias_scale),
+        "b0": b0,
+        "observer": specification.observer[1:],
+        "model_polynomial": model.polynomial[1:],
+        "internal_model": specification.internal_model,
+        "adapted_pole": specification.adapted_pole,
+        "scaling": np.append(controller.design.scaling, unit_force * controller.bias_force),
         "filter_A": filter_A,
         "filter_B": filter_B,
         "model_A": model_A,
@@ -228,18 +275,20 @@ def _parameter_values(controller: AdaptiveRST) -> Mapping[str, FloatArray]:
         "initial_gains": [*controller.initial_gains, 0.0],
         **_prefilter_values(controller.prefilter, domain),
     }
-    size = len(GAIN_NAMES)
+    if specification.degree > 1:
+        values["known"] = _known_part(specification)
+    size = len(controller.gain_names)
     if controller.oscillator is not None:
         size += 2 * controller.oscillator.harmonics
-        values["model_damping"] = 2 * model.damping * model.bandwidth
-        values |= oscillator_values(
-            controller.oscillator,
-            observer_pole=ao,
-            bandwidth=model.bandwidth,
-            b0=specification.plant.b0,
-        )
+        values |= oscillator_values(controller.oscillator, unit_force=unit_force)
     values |= controller.law.parameters(size)
     return {name: readonly(np.ravel(value)) for name, value in values.items()}
+
+
+def _known_part(specification: RSTSpecification) -> FloatArray:
+    """K = (p + c) D − Ao, of degree n − 2, highest power first, (n − 1,)."""
+    placed = np.convolve([1.0, specification.adapted_pole], specification.internal_model)
+    return np.asarray(placed - specification.observer, dtype=float)[2:]
 
 
 def _prefilter_values(prefilter: ReferenceModel | None, domain: TimeDomain) -> Mapping[str, Any]:
@@ -249,12 +298,6 @@ def _prefilter_values(prefilter: ReferenceModel | None, domain: TimeDomain) -> M
     A, B = linear_advance(domain, *_second_order(prefilter))
     values = (A, B, prefilter.bandwidth, prefilter.damping)
     return dict(zip(names, values, strict=True)) | {"direct": 0}
-
-
-def _regressor_filter(model: ReferenceModel, ao: float) -> tuple[FloatArray, FloatArray]:
-    """States (x, z1, z2) of x' = −ao x + v, z = (p, 1) x / Am(p), driven by v."""
-    A = [[-ao, 0, 0], [1, -2 * model.damping * model.bandwidth, -(model.bandwidth**2)], [0, 1, 0]]
-    return np.array(A), np.array([[1.0], [0.0], [0.0]])
 
 
 def _second_order(model: ReferenceModel) -> tuple[FloatArray, FloatArray]:
@@ -283,30 +326,12 @@ def _reference_path(
     return _ReferenceSignal(desired, desired + c1 * rate + c2 * acceleration)
 
 
-def _filtered_signals(
-    state: Mapping[str, ca.SX], symbols: Mapping[str, ca.SX], force: ca.SX, command_input: ca.SX
-) -> ca.SX:
-    """P1 φ: the regressor before the reference model's filter, free of derivatives of u."""
-    ao = symbols["ao"]
-    xu, xy, xc = (state[f"filtered_{name}"][0] for name in ("command", "force", "reference"))
-    return ca.vertcat(xu, force - ao * xy, xy, -(command_input - ao * xc), -xc, 1 / ao)
-
-
-def _regressor(state: Mapping[str, ca.SX], symbols: Mapping[str, ca.SX]) -> ca.SX:
-    """φ, the last entry being the constant 1 that has settled through 1/(Ao Am)."""
-    zu, zy, zc = (state[f"filtered_{name}"][1:] for name in ("command", "force", "reference"))
-    constant = 1 / (symbols["ao"] * symbols["bandwidth"] ** 2)
-    return ca.vertcat(zu[1], zy[0], zy[1], -zc[0], -zc[1], constant)
-
-
 def _filter(symbols: Mapping[str, ca.SX], x: ca.SX, v: ca.SX) -> ca.SX:
-    A, b = symbols["filter_A"], symbols["filter_B"]
-    # Row-major A; its entries (0, 1) and (0, 2) are zero in either time domain.
-    return ca.vertcat(
-        A[0] * x[0] + b[0] * v,
-        A[3] * x[0] + A[4] * x[1] + A[5] * x[2] + b[1] * v,
-        A[6] * x[0] + A[7] * x[1] + A[8] * x[2] + b[2] * v,
-    )
+    order = x.numel()
+    A = ca.reshape(symbols["filter_A"], order, order).T
+    # What the second part of the chain does never acts back on the first: those entries are zero.
+    A[: order - 2, order - 2 :] = 0
+    return A @ x + symbols["filter_B"] * v
 
 
 def _second_order_step(symbols: Mapping[str, ca.SX], name: str, x: ca.SX, v: ca.SX) -> ca.SX:
@@ -316,13 +341,11 @@ def _second_order_step(symbols: Mapping[str, ca.SX], name: str, x: ca.SX, v: ca.
 
 def _resting_state(layout: Layout, symbols: Mapping[str, ca.SX], force: ca.SX) -> ca.SX:
     """At rest y = u_c = F: the filters have settled on F and the command is zero."""
-    settled = ca.vertcat(
-        force / symbols["ao"], 0, force / (symbols["ao"] * symbols["bandwidth"] ** 2)
-    )
+    still = settled(symbols["observer"], symbols["model_polynomial"], force)
     resting = {
-        "filtered_command": ca.SX.zeros(3),
-        "filtered_force": settled,
-        "filtered_reference": settled,
+        "filtered_command": ca.SX.zeros(still.numel()),
+        "filtered_force": still,
+        "filtered_reference": still,
         "gains": symbols["initial_gains"],
         "model": ca.vertcat(0, force),
         "prefilter": ca.vertcat(0, (1 - symbols["direct"]) * force),

@@ -62,12 +62,12 @@ class Oscillator:
 
 
 def oscillator_values(
-    oscillator: Oscillator, *, observer_pole: float, bandwidth: float, b0: float
+    oscillator: Oscillator, *, unit_force: float
 ) -> Mapping[str, FloatArray | float]:
-    """Parameters of the generated code; the gains' scale is that of the bias, 1/(Ao Am)."""
-    scale = observer_pole * bandwidth**2 / b0 * oscillator.force
+    """Parameters of the generated code; `unit_force` Ao(0) ω²/b0 makes 1/(Ao Am) a force, as it
+    does for the bias."""
     return {
-        "harmonic_scaling": np.full(2 * oscillator.harmonics, scale),
+        "harmonic_scaling": np.full(2 * oscillator.harmonics, unit_force * oscillator.force),
         "oscillator_start": 2 * np.pi * oscillator.frequency,
         "oscillator_range": 2 * np.pi * np.array([oscillator.lowest, oscillator.highest]),
         "oscillator_tracking": oscillator.tracking,
@@ -80,15 +80,15 @@ class HarmonicSignals:
     """The regressors before and after the reference model's filter."""
 
     coarse: ca.SX
-    """P1 φ, pairs (cos iϕ, sin iϕ)/ao."""
+    """P1 φ, pairs (cos iϕ, sin iϕ)/Ao(0)."""
     regressor: ca.SX
     """φ = (1/Am) of those, settled at the present frequency."""
 
 
 def harmonic_signals(
-    oscillator: Oscillator, symbols: Mapping[str, ca.SX], state: ca.SX, model_damping: ca.SX
+    oscillator: Oscillator, state: ca.SX, *, static: ca.SX, model: ca.SX
 ) -> HarmonicSignals:
-    """Both for the oscillator's `state` (ϕ, ν); `model_damping` is 2ξω of the model (rad/s).
+    """Both for the oscillator's `state` (ϕ, ν); `static` is Ao(0), `model` 2ξω and ω² of Am.
 
     A sinusoid passes 1/Am = 1/((ω² − ν²) + 2jξων) scaled and turned; the filter settles in a few
     1/ω, far faster than a frequency changes.
@@ -102,9 +102,9 @@ def harmonic_signals(
             turned[0] * cosine - turned[1] * sine,
             turned[1] * cosine + turned[0] * sine,
         )
-        c, s = (part / symbols["ao"] for part in turned)
-        real = symbols["bandwidth"] ** 2 - (order * frequency) ** 2
-        imaginary = model_damping * order * frequency
+        c, s = (part / static for part in turned)
+        real = model[1] - (order * frequency) ** 2
+        imaginary = model[0] * order * frequency
         size = real**2 + imaginary**2
         coarse += [c, s]
         regressor += [(real * c + imaginary * s) / size, (real * s - imaginary * c) / size]

@@ -33,6 +33,9 @@ STEP_INPUTS = ("state", "q", "qd", "force", "reference", "parameters")
 STEP_OUTPUTS = ("next_state", "torque", "signals")
 """Names of the outputs of `RobotStep.step`, in order."""
 
+_NOTHING = 1e-30
+"""Lost beside any effort (N·m or N), and not 0 even in single precision."""
+
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class RobotStep:
@@ -144,7 +147,8 @@ def _step_outputs(
         {name: symbols[name] for name, _ in linearisation.parameters.blocks}
     )
     wanted = linearisation.torque(q, qd, force, command, model)
-    torque = saturated(wanted, symbols["effort_limit"])
+    held = linearisation.torque(q, qd, force, ca.DM.zeros(len(axes)), model)
+    torque = within_limits(wanted, wanted - held, symbols["effort_limit"])
     applied = command + _lost_acceleration(dynamics, q, torque - wanted, symbols)
     advanced = [
         controller.advance(*part[:3], applied[i], part[3])
@@ -162,6 +166,28 @@ def _step_outputs(
     signals = Layout(tuple((name, value.numel()) for name, value in reported.items()))
     following = ca.vertcat(*(state for state, _ in advanced))
     return [following, torque, signals.join(reported)], signals
+
+
+def within_limits(wanted: ca.SX, commanded: ca.SX, limit: ca.SX) -> ca.SX:
+    """Efforts within ± `limit`: of the part that the force command adds, as much as there is room.
+
+    The command shrinks as a whole and keeps its direction; clipping joint by joint would turn it,
+    and through the Jacobian push an axis that asked for nothing. What is out of its limits
+    without any command is clipped. All in N·m or N.
+    """
+    # Which share of the command is too much, at most 1, and none where it pushes inwards.
+    excess = _positive_part(ca.fabs(wanted) - limit)
+    share = excess / (ca.fmax(ca.fabs(commanded), excess) + _NOTHING)
+    along = wanted * commanded
+    outwards = _positive_part(along) / (ca.fabs(along) + _NOTHING)  # 1 or 0
+    cut = ca.mmax(share * outwards)
+    return saturated(wanted - cut * commanded, limit)
+
+
+def _positive_part(x: ca.SX) -> ca.SX:
+    """max(x, 0) without a comparison, of which compilers make branches: a step is to take the
+    same time on all data."""
+    return (x + ca.fabs(x)) / 2
 
 
 def saturated(wanted: ca.SX, limit: ca.SX) -> ca.SX:

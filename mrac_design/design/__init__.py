@@ -17,12 +17,6 @@ from mrac_design.design.family import (
     greatest_degree_of_Q,
     smallest_Q,
 )
-from mrac_design.design.integral_rst import (
-    IntegralRSTDesign,
-    IntegralRSTSpecification,
-    design_integral_rst,
-    design_integral_rst_exact,
-)
 from mrac_design.design.loop import FeedbackLoop
 from mrac_design.design.margins import StabilityMargins, stability_margins
 from mrac_design.design.pole_placement import FollowModel, PolePlacement, UnitStaticGain
@@ -39,6 +33,8 @@ from mrac_design.design.rst import (
     design_rst,
     design_rst_exact,
     diophantine_system,
+    first_order_observer,
+    gain_names,
 )
 from mrac_design.design.symbolic import (
     ClosedForm,
@@ -66,8 +62,6 @@ __all__ = [
     "ExactPolynomialDesign",
     "FeedbackLoop",
     "FollowModel",
-    "IntegralRSTDesign",
-    "IntegralRSTSpecification",
     "KeepZeros",
     "PolePlacement",
     "PolynomialDesign",
@@ -78,13 +72,13 @@ __all__ = [
     "StabilityMargins",
     "UnitStaticGain",
     "WellDampedRegion",
-    "design_integral_rst",
-    "design_integral_rst_exact",
     "design_rst",
     "design_rst_exact",
     "diophantine_system",
     "family_member",
     "family_member_exact",
+    "first_order_observer",
+    "gain_names",
     "greatest_degree_of_Q",
     "integral_rst_closed_form",
     "integral_rst_sensitivities",

@@ -9,7 +9,6 @@ import numpy as np
 from flint import fmpq
 
 from mrac_design.arrays import FloatArray, readonly
-from mrac_design.design.integral_rst import IntegralRSTSpecification
 from mrac_design.design.rst import RSTSpecification
 from mrac_design.errors import ParameterError
 from mrac_design.polynomials.expressions import Expression, Letter, solve_symbolic, symbols
@@ -20,8 +19,8 @@ STIFFNESS = Letter(name="Ks", latex="K_s")
 BANDWIDTH = Letter(name="omega", latex=r"\omega")
 DAMPING = Letter(name="xi", latex=r"\xi")
 OBSERVER_POLE = Letter(name="ao", latex="a_o")
-OBSERVER_BANDWIDTH = Letter(name="omega_o", latex=r"\omega_o")
-OBSERVER_DAMPING = Letter(name="xi_o", latex=r"\xi_o")
+OBSERVER_FIRST = Letter(name="alpha1", latex=r"\alpha_1")
+OBSERVER_SECOND = Letter(name="alpha2", latex=r"\alpha_2")
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -127,14 +126,13 @@ def rst_closed_form() -> ClosedForm:
 def integral_rst_closed_form() -> ClosedForm:
     """r1, s0, s1, s2, t0, t1, t2 of the controller with integrator, R = p(p + r1).
 
-    Letters K2, Ks, omega, xi and omega_o, xi_o of Ao = p² + 2ξo ωo p + ωo².
+    Letters K2, Ks, omega, xi and alpha1, alpha2 of Ao = p² + α1 p + α2.
     """
-    K2, Ks, omega, xi, omega_o, xi_o = symbols(
-        (VELOCITY_GAIN, STIFFNESS, BANDWIDTH, DAMPING, OBSERVER_BANDWIDTH, OBSERVER_DAMPING)
+    K2, Ks, omega, xi, alpha1, alpha2 = symbols(
+        (VELOCITY_GAIN, STIFFNESS, BANDWIDTH, DAMPING, OBSERVER_FIRST, OBSERVER_SECOND)
     )
     one, zero = K2.constant(1), K2.constant(0)
-    Am = [one, 2 * xi * omega, omega * omega]
-    Ao = [one, 2 * xi_o * omega_o, omega_o * omega_o]
+    Am, Ao = [one, 2 * xi * omega, omega * omega], [one, alpha1, alpha2]
     X, S = solve_symbolic([one, K2, zero, zero], [Ks], _product(Am, Ao))
     T = [omega * omega / Ks * value for value in Ao]
     return ClosedForm(
@@ -156,8 +154,13 @@ def rst_sensitivities(specification: RSTSpecification) -> SensitivityTable:
     )
 
 
-def integral_rst_sensitivities(specification: IntegralRSTSpecification) -> SensitivityTable:
-    """Sensitivities of r1, s0, s1, s2, t0, t1, t2 to K2, Ks, ω, ξ, ωo and ξo at a design."""
+def integral_rst_sensitivities(specification: RSTSpecification) -> SensitivityTable:
+    """Sensitivities of r1, s0, s1, s2, t0, t1, t2 to K2, Ks, ω, ξ, α1 and α2 at a design.
+
+    Raises ParameterError for a design whose internal model is not p.
+    """
+    if specification.internal_model != (1.0, 0.0):
+        raise ParameterError("internal model", specification.internal_model, "must be p: (1, 0)")
     model, plant = specification.reference_model, specification.plant
     return integral_rst_closed_form().sensitivities(
         {
@@ -165,8 +168,8 @@ def integral_rst_sensitivities(specification: IntegralRSTSpecification) -> Sensi
             "Ks": plant.stiffness,
             "omega": model.bandwidth,
             "xi": model.damping,
-            "omega_o": specification.observer_bandwidth,
-            "xi_o": specification.observer_damping,
+            "alpha1": specification.observer[1],
+            "alpha2": specification.observer[2],
         }
     )
 

@@ -16,7 +16,7 @@ from numpy.typing import ArrayLike
 
 from mrac_design.arrays import FloatArray, readonly
 from mrac_design.controller.linearisation import Linearisation
-from mrac_design.controller.robot_step import saturated
+from mrac_design.controller.robot_step import within_limits
 from mrac_design.controller.step import ControllerStep
 from mrac_design.layout import Layout
 from mrac_design.robot import RobotDynamics, check_posture, inertial_parameters
@@ -152,7 +152,8 @@ def _system(
         signals.append(step.signals.split(signal))
     command = ca.vertcat(*commands)
     wanted = linearisation.torque(q, qd, force, command, symbols["linearisation"])
-    effort = saturated(wanted, symbols["effort_limit"])
+    still = linearisation.torque(q, qd, force, ca.DM.zeros(len(axes)), symbols["linearisation"])
+    effort = within_limits(wanted, wanted - still, symbols["effort_limit"])
     qdd = plant.acceleration(states, effort, force, symbols)
     rate = ca.vertcat(qd, qdd, *following)
 

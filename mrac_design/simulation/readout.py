@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from mrac_design.controller.adaptive import GAIN_NAMES
+from mrac_design.controller.adaptive import BIAS
+from mrac_design.design import gain_names
 from mrac_design.simulation.closed_loop import ForceLoop
 from mrac_design.simulation.run import Recording
 from mrac_design.simulation.trajectory import Signal, Trajectory
@@ -42,10 +43,13 @@ def force_loop_trajectory(loop: ForceLoop, recording: Recording, *, engine: str)
         labels=joints,
         description="motor torque",
     )
+    gains = outputs["adapted_gains"]
+    per_axis = gains.shape[1] // len(robot.force_axes)
+    names = (*gain_names(per_axis // 2 - 2), BIAS)  # r1', n + 1 of S, n + 1 of T and the bias
     signals["adapted_gains"] = Signal(
-        values=outputs["adapted_gains"],
+        values=gains,
         unit="1",
-        labels=tuple(f"{axis} {gain}" for axis in robot.force_axes for gain in GAIN_NAMES),
+        labels=tuple(f"{axis} {name}" for axis in robot.force_axes for name in names),
         description="adapted gains, scaled to order one",
     )
     return Trajectory(time=recording.time, signals=signals, engine=engine)

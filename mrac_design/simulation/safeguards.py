@@ -22,7 +22,7 @@ class Safeguard(Protocol):
     """One wrapper of a law."""
 
     def wrap(self, law: AdaptationLaw, nominal: tuple[float, ...]) -> AdaptationLaw:
-        """The law inside the wrapper; `nominal` are the design's scaled gains, 5 values."""
+        """The law inside the wrapper; `nominal` are the design's scaled gains."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -30,7 +30,7 @@ class Projection:
     """Gains kept within a share of their nominal values: the box a certificate covers."""
 
     share: float
-    """Largest relative deviation of each of the five gains, ≥ 0."""
+    """Largest relative deviation of each gain of R, S and T, ≥ 0."""
     bias: float
     """Largest |scaled bias gain|, ≥ 0."""
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import os
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any, TypeVar
 
@@ -12,9 +12,10 @@ import tomli_w
 
 from mrac_design.controller.adaptation import AdaptationLaw, GradientLaw, NormalisedGradientLaw
 from mrac_design.controller.linearisation import RobotModelError
-from mrac_design.design import ReferenceModel
+from mrac_design.design import ReferenceModel, RSTSpecification, first_order_observer
 from mrac_design.errors import ParameterError, ScenarioFileError
 from mrac_design.motion import ForceReference
+from mrac_design.plant import ForcePlant
 from mrac_design.resources import models_directory
 from mrac_design.simulation.plant_choices import (
     CONTACT_KEYS,
@@ -63,10 +64,46 @@ class DesignChoice:
     """ω of the reference model (rad/s)."""
     damping: float
     """ξ of the reference model."""
-    observer_pole: float
-    """ao of the observer polynomial Ao = p + ao (rad/s)."""
+    observer: tuple[float, ...]
+    """Observer polynomial Ao, highest power first, monic; (1, ao) is the paper's p + ao. In a file
+    `observer_pole` ao or `observer`."""
+    internal_model: tuple[float, ...]
+    """Factor D of R, highest power first, monic; (1,) is none. May be left out of a file with
+    `observer_pole`."""
     tool_axis_bandwidth: float
     """Bandwidth of the PD control of the tool axis (rad/s)."""
+
+    def __post_init__(self) -> None:
+        self.specification  # noqa: B018  (raises what no design can have)
+
+    @property
+    def specification(self) -> RSTSpecification:
+        """What the RST design is made from."""
+        return RSTSpecification(
+            plant=ForcePlant(stiffness=self.stiffness, velocity_gain=self.velocity_gain),
+            reference_model=ReferenceModel(bandwidth=self.bandwidth, damping=self.damping),
+            observer=self.observer,
+            internal_model=self.internal_model,
+        )
+
+    @property
+    def observer_pole(self) -> float:
+        """ao of Ao = p + ao (rad/s). Raises ParameterError for an observer of higher degree."""
+        return self.specification.observer_pole
+
+    def with_observer_pole(self, pole: float) -> DesignChoice:
+        """The same with Ao = p + `pole`. Raises ParameterError where an internal model needs an
+        observer of higher degree."""
+        if len(self.internal_model) != 1:
+            raise ParameterError(
+                "observer pole", pole, "this design has an internal model: give its whole observer"
+            )
+        return replace(self, observer=first_order_observer(pole))
+
+    @property
+    def gain_count(self) -> int:
+        """Number of gains that adapt, without the bias."""
+        return len(self.specification.gain_names)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -87,7 +124,7 @@ class AdaptationChoice:
     def build(self, gain: float, *, nominal: tuple[float, ...]) -> AdaptationLaw:
         """The law inside its safeguards, with `gain` in place of its own (0 when frozen).
 
-        `nominal` are the design's scaled gains, 5 values, which safeguards refer to.
+        `nominal` are the design's scaled gains, which safeguards refer to.
         """
         return wrapped(LAWS[self.law](gain, self.normalisation), self.safeguards, nominal)
 
@@ -199,9 +236,9 @@ def load_scenario(name_or_path: str | Path) -> Scenario:
             contact=read_contact(contact),
             friction=_section(root.table("friction"), FrictionChoice),
             sampling=read_sampling(root.table("sampling")),
-            design=_section(root.table("design"), DesignChoice),
+            design=(design := _design(root.table("design"))),
             prefilter=_section(root.table("prefilter"), ReferenceModel),
-            adaptation=_adaptation(root.table("adaptation")),
+            adaptation=_adaptation(root.table("adaptation"), design.gain_count),
             model_error=_section(root.table("model_error"), RobotModelError),
             reference=_reference(root.table("reference")),
             simulation=_section(root.table("simulation"), SimulationChoice),
@@ -222,7 +259,7 @@ def save_scenario(scenario: Scenario, path: Path) -> None:
         "contact": contact_entries(scenario.stiffness, scenario.contact),
         "friction": _entries(scenario.friction),
         "sampling": sampling_entries(scenario.sampling),
-        "design": _entries(scenario.design),
+        "design": _design_entries(scenario.design),
         "prefilter": _entries(scenario.prefilter),
         "adaptation": {
             **_entries(scenario.adaptation),
@@ -260,7 +297,49 @@ def _motion(table: Table) -> MotionChoice:
     )
 
 
-def _adaptation(table: Table) -> AdaptationChoice:
+_PAPER_KEYS = ("stiffness", "velocity_gain", "bandwidth", "damping", "tool_axis_bandwidth")
+
+
+def _design(table: Table) -> DesignChoice:
+    """The design, with the paper's observer pole or with an observer and an internal model."""
+    whole = [key for key in ("observer", "internal_model") if key in table.entries]
+    if whole and "observer_pole" in table.entries:
+        raise table.error(
+            whole[0], "stands beside observer_pole; keep the pole, or observer and internal_model"
+        )
+    table.only(*_PAPER_KEYS, *(("observer", "internal_model") if whole else ("observer_pole",)))
+    if whole:
+        observer = tuple(table.numbers("observer"))
+        internal_model = tuple(table.numbers("internal_model"))
+    else:
+        observer, internal_model = first_order_observer(table.number("observer_pole")), (1.0,)
+    numbers = {name: table.number(name) for name in _PAPER_KEYS}
+    try:
+        return DesignChoice(**numbers, observer=observer, internal_model=internal_model)
+    except ParameterError as error:
+        key = _key_of(error.name, table)
+        raise table.error(key, f"{error.value}: {error.requirement}") from error
+
+
+def _key_of(name: str, table: Table) -> str:
+    """The key behind a parameter's name: "internal model" is internal_model, and an "observer"
+    that is not there has come from observer_pole."""
+    words = name.replace(" ", "_")
+    return next((k for k in table.entries if words.startswith(k) or k.startswith(words)), name)
+
+
+def _design_entries(design: DesignChoice) -> dict[str, Any]:
+    entries = {name: getattr(design, name) for name in _PAPER_KEYS}
+    if design.internal_model == (1.0,) and len(design.observer) == 2:
+        return {**entries, "observer_pole": design.observer[1]}
+    return {
+        **entries,
+        "observer": list(design.observer),
+        "internal_model": list(design.internal_model),
+    }
+
+
+def _adaptation(table: Table, gain_count: int) -> AdaptationChoice:
     table.only("law", "gain", "normalisation", "bias_force", "safeguards")
     table.choice("law", LAWS)
     choice = AdaptationChoice(
@@ -270,7 +349,7 @@ def _adaptation(table: Table) -> AdaptationChoice:
         bias_force=table.number("bias_force"),
         safeguards=read_safeguards(table),
     )
-    table.build(lambda: choice.build(choice.gain, nominal=(1.0,) * 5))
+    table.build(lambda: choice.build(choice.gain, nominal=(1.0,) * gain_count))
     return choice
 
 

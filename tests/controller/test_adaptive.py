@@ -9,12 +9,15 @@ import control
 import numpy as np
 import pytest
 from scipy.integrate import solve_ivp
+from scipy.linalg import expm
 
 from mrac_design.controller.adaptation import GradientLaw, NormalisedGradientLaw
-from mrac_design.controller.adaptive import GAIN_NAMES, AdaptiveRST, build_step, nominal_gains
+from mrac_design.controller.adaptive import AdaptiveRST, build_step, nominal_gains
 from mrac_design.controller.reference import DirectReference, ModelInverse
+from mrac_design.controller.rivals.fixed_rst import FixedRST, fixed_rst
+from mrac_design.controller.rivals.linear import build_linear_step
 from mrac_design.controller.step import ControllerStep
-from mrac_design.design import ReferenceModel, RSTSpecification, design_rst
+from mrac_design.design import ReferenceModel, RSTSpecification, design_rst, first_order_observer
 from mrac_design.errors import ParameterError
 from mrac_design.plant import ForcePlant
 from mrac_design.time_domain import Continuous, Discrete
@@ -24,16 +27,36 @@ PAPER = design_rst(
     RSTSpecification(
         plant=ForcePlant(stiffness=800.0, velocity_gain=50.0),
         reference_model=ReferenceModel(bandwidth=500.0, damping=1.0),
-        observer_pole=500.0,
+        observer=first_order_observer(500.0),
     )
 )
 BOOK = design_rst(
     RSTSpecification(
         plant=ForcePlant(stiffness=2.0, velocity_gain=1.0),
         reference_model=ReferenceModel(bandwidth=1.0, damping=0.7),
-        observer_pole=2.0,
+        observer=first_order_observer(2.0),
     )
 )
+
+
+RESONANT = design_rst(
+    RSTSpecification(
+        plant=ForcePlant(stiffness=800.0, velocity_gain=20.0),
+        reference_model=ReferenceModel(bandwidth=300.0, damping=1.2),
+        observer=(1.0, 250.0, 30000.0, 1.5e6),
+        internal_model=(1.0, 11.0, 1400.0),
+    )
+)
+INTEGRAL = design_rst(
+    RSTSpecification(
+        plant=ForcePlant(stiffness=800.0, velocity_gain=20.0),
+        reference_model=ReferenceModel(bandwidth=300.0, damping=1.0),
+        observer=(1.0, 350.0, 40000.0),
+        internal_model=(1.0, 0.0),
+    )
+)
+PREFILTER = ReferenceModel(bandwidth=50.0, damping=1.0)
+DEGREES = pytest.mark.parametrize("design", [PAPER, INTEGRAL, RESONANT], ids=["1", "2", "3"])
 
 
 def controller(design=PAPER, **changes) -> AdaptiveRST:
@@ -55,13 +78,14 @@ def advance(step: ControllerStep, x, force, reference):
     return float(command), following.full().ravel(), step.signals.split(signals.full().ravel())
 
 
-def simulate(step: ControllerStep, plant: ForcePlant, reference, times, tolerance=1e-9):
-    """Plant y'' = −K2 y' + b0 u under `step`, reference held between `times`, from rest."""
+def simulate(step: ControllerStep, plant: ForcePlant, reference, times, tolerance=1e-9, push=0.0):
+    """Plant y'' = −K2 y' + b0 (u + push) from rest, the reference held between `times`."""
     n = step.state.size
 
     def rhs(_, x, level):
         command, following, _ = advance(step, x[2:], x[0], level)
-        return np.concatenate([[x[1], -plant.velocity_gain * x[1] + plant.b0 * command], following])
+        acceleration = -plant.velocity_gain * x[1] + plant.b0 * (command + push)
+        return np.concatenate([[x[1], acceleration], following])
 
     start = step.equilibrium(0.0, step.parameter_values).full().ravel()
     rows = [np.concatenate([[0.0, 0.0], start])]
@@ -80,8 +104,9 @@ def gains_of(step: ControllerStep, rows):
     return step.state.split(rows[:, 2:])["gains"]
 
 
+@DEGREES
 @pytest.mark.parametrize("alpha", [None, 0.1])
-def test_step_is_the_plain_numpy_loop(alpha):
+def test_step_is_the_plain_numpy_loop(alpha, design):
     """Scaled generated step against the SI formulas, through a step of the force."""
     gamma_hat = 1.0
     law = (
@@ -89,25 +114,35 @@ def test_step_is_the_plain_numpy_loop(alpha):
         if alpha is None
         else NormalisedGradientLaw(gain=gamma_hat, alpha=alpha)
     )
-    step = build_step(controller(law=law))
-    omega, b0 = 500.0, 800.0
+    specification = design.specification
+    model, plant = specification.reference_model, specification.plant
     oracle = AxisLoop(
-        b0=b0, k2=50.0, omega=omega, xi=1.0, ao=500.0,
-        gamma=gamma_hat * omega * b0 * PAPER.scaling**2, alpha=alpha,
+        b0=plant.b0, k2=plant.velocity_gain, omega=model.bandwidth, xi=model.damping,
+        observer=specification.observer, internal_model=specification.internal_model,
+        scaling=np.array(design.scaling),
+        gamma=gamma_hat * model.bandwidth * plant.b0 * design.scaling**2, alpha=alpha,
     )  # fmt: skip
     # Start off the solution, or there would be nothing to adapt.
-    theta = 0.8 * PAPER.parameters
-    step = build_step(controller(law=law, initial_gains=tuple(0.8 * PAPER.scaled_parameters)))
+    start, count = 0.8 * design.scaled_parameters, len(design.parameters)
+    step = build_step(controller(design, law=law, initial_gains=tuple(start)))
     times = np.array([0.0, 0.01, 0.02, 0.05])
     reference = lambda t: 1.5 if t < 0.02 else 1.0  # noqa: E731
-    ours = simulate(step, PAPER.specification.plant, reference, times, tolerance=1e-11)
-    plain = oracle.run(theta=theta, uc=reference, times=times, tolerance=1e-11)
+    ours = simulate(step, plant, reference, times, tolerance=1e-11)
+    plain = oracle.run(theta=0.8 * design.parameters, uc=reference, times=times, tolerance=1e-11)
     # Both integrated to 1e-11; forces are of order 1 N, gains of order 1.
     np.testing.assert_allclose(ours[:, 0], plain[:, 0], atol=1e-8)
-    np.testing.assert_allclose(
-        gains_of(step, ours)[:, :5] * PAPER.scaling, plain[:, 13:], rtol=1e-7
-    )
-    assert np.abs(gains_of(step, ours)[-1, :5] - 0.8 * PAPER.scaled_parameters).max() > 1e-3
+    gains = gains_of(step, ours)[:, :count]
+    np.testing.assert_allclose(gains * design.scaling, plain[:, oracle.gains_at :], rtol=1e-7)
+    assert np.abs(gains[-1] - start).max() > 1e-3
+    wrong = []
+    for row, state, t in zip(ours[1:], plain[1:], times[1:], strict=True):
+        # Without disturbance ε is nothing but the gains' error: ε = b0 φᵀ(θ⁰ − θ).
+        _, phi, error = oracle.signals(state, reference(t - 1e-9))
+        wrong.append(plant.b0 * phi @ (design.parameters - state[oracle.gains_at :]))
+        found = advance(step, row[2:], row[0], reference(t - 1e-9))[2]["augmented_error"]
+        assert error == pytest.approx(wrong[-1], abs=1e-8)
+        assert float(found[0]) == pytest.approx(wrong[-1], abs=1e-8)
+    assert np.abs(wrong).max() > 1e-3
 
 
 def test_zero_gain_is_the_frozen_rst_controller():
@@ -126,6 +161,89 @@ def test_zero_gain_is_the_frozen_rst_controller():
     expected = through_uc - through_y
     # forced_response holds linear between samples of 50 µs: about (130 h)²/8 of the signal.
     np.testing.assert_allclose(ours, expected[::100], atol=2e-5 * np.abs(expected).max())
+
+
+def fixed_of(design, domain):
+    """The controller with fixed gains, (rows, command) over [state, y, r, u], and its rest."""
+    fixed = fixed_rst(
+        FixedRST(design=design, prefilter=PREFILTER, feedforward=ModelInverse(), time_domain=domain)
+    )
+    step = build_linear_step(fixed)
+    return fixed.matrices(), step.equilibrium(1.0, step.parameter_values).full().ravel()
+
+
+@DEGREES
+def test_zero_gain_is_the_fixed_controller_sample_by_sample(design):
+    """Two realisations of the same R, S, T: one filter a signal against one observer for all."""
+    step = build_step(
+        controller(
+            design,
+            law=NormalisedGradientLaw(gain=0.0, alpha=0.1),
+            prefilter=PREFILTER,
+            feedforward=ModelInverse(),
+            time_domain=Discrete(1e-3),
+        )
+    )
+    (rows, command_row), state = fixed_of(design, Discrete(1e-3))
+    x = step.equilibrium(1.0, step.parameter_values).full().ravel()
+    rng = np.random.default_rng(3)
+    ours, expected = [], []
+    for force, reference in 1 + 0.3 * rng.normal(size=(400, 2)):
+        command, x, _ = advance(step, x, force, reference)
+        columns = np.concatenate([state, [force, reference, 0.0]])
+        columns[-1] = command_row @ columns
+        state = rows @ columns
+        ours.append(command)
+        expected.append(columns[-1])
+    # Rounding, over some hundred samples of the controllers' memory.
+    np.testing.assert_allclose(ours, expected, rtol=0, atol=1e-10 * np.abs(expected).max())
+    assert np.abs(expected).max() > 10.0
+
+
+@DEGREES
+def test_zero_gain_is_the_fixed_controller_in_continuous_time(design):
+    step = build_step(
+        controller(
+            design,
+            law=NormalisedGradientLaw(gain=0.0, alpha=0.1),
+            prefilter=PREFILTER,
+            feedforward=ModelInverse(),
+        )
+    )
+    (rows, command_row), state = fixed_of(design, Continuous())
+    n = rows.shape[0]
+    closed = rows[:, :-1] + np.outer(rows[:, -1], command_row[:-1])
+    x = step.equilibrium(1.0, step.parameter_values).full().ravel()
+    rng = np.random.default_rng(4)
+    ours, expected, span = [], [], 4e-3
+    for force, reference in 1 + 0.3 * rng.normal(size=(12, 2)):
+        ours.append(advance(step, x, force, reference)[0])
+        expected.append(command_row[:-1] @ [*state, force, reference])
+        x = solve_ivp(
+            lambda _, x, at=(force, reference): advance(step, x, *at)[1],
+            (0, span), x, method="DOP853", rtol=1e-10, atol=1e-12,
+        ).y[:, -1]  # fmt: skip
+        held = np.vstack([closed, np.zeros((2, n + 2))])
+        state = (expm(span * held) @ [*state, force, reference])[:n]
+    # The filters' states, integrated to 1e-10, times gains some thousand times their size.
+    np.testing.assert_allclose(ours, expected, rtol=0, atol=1e-7 * np.abs(expected).max())
+
+
+@pytest.mark.parametrize(("bias", "gain"), [(0.0, 0.0), (1.0, 1.0)], ids=["fixed", "adapting"])
+def test_a_bias_does_what_an_integrator_in_r_would(bias, gain):
+    """A constant push leaves b0 R(0)/(Ao Am)(0) of it as force, or nothing once the bias has it."""
+    push, law = 4.0, NormalisedGradientLaw(gain=gain, alpha=0.1)
+    plant = RESONANT.specification.plant
+    left = plant.b0 * RESONANT.R[-1] / np.prod(-RESONANT.closed_loop_poles).real * push
+    assert left > 5e-3
+    times = np.linspace(0.0, 1.5, 4)
+    step = build_step(controller(RESONANT, law=law, bias_force=bias))
+    end = simulate(step, plant, lambda t: 0.0, times, tolerance=1e-9, push=push)[-1, 0]
+    assert end == pytest.approx(left if bias == 0.0 else 0.0, abs=1e-3 * left)
+    # R with a root at 0 needs no bias.
+    step = build_step(controller(INTEGRAL, law=NormalisedGradientLaw(gain=0.0, alpha=0.1)))
+    still = simulate(step, plant, lambda t: 0.0, times, tolerance=1e-9, push=push)[-1, 0]
+    assert still == pytest.approx(0.0, abs=1e-3 * left)
 
 
 def test_lyapunov_function_never_increases_without_disturbance():
@@ -228,7 +346,7 @@ def test_bias_regressor_learns_a_constant_push_without_force():
         settled = step.equilibrium(0.0, step.parameter_values).full().ravel()
         gains = step.state.split(advance(step, settled, 0.01, 0.0)[1])["gains"]
         assert bool(np.abs(gains).max() > 0) is moves
-        assert not np.abs(gains[: len(GAIN_NAMES) - 1]).any()
+        assert not np.abs(gains[:5]).any()
 
 
 @pytest.mark.parametrize(

@@ -16,7 +16,7 @@ from mrac_design.controller.oscillator import (
     oscillator_values,
 )
 from mrac_design.controller.reference import ModelInverse
-from mrac_design.design import ReferenceModel, RSTSpecification, design_rst
+from mrac_design.design import ReferenceModel, RSTSpecification, design_rst, first_order_observer
 from mrac_design.errors import ParameterError
 from mrac_design.motion.reference import constant_force
 from mrac_design.motion.signal import quintic_hermite
@@ -34,7 +34,7 @@ DESIGN = design_rst(
     RSTSpecification(
         plant=ForcePlant(stiffness=800.0, velocity_gain=50.0),
         reference_model=ReferenceModel(bandwidth=300.0, damping=1.0),
-        observer_pole=300.0,
+        observer=first_order_observer(300.0),
     )
 )
 OSCILLATOR = Oscillator(
@@ -94,9 +94,11 @@ def residual(trajectory):
 @pytest.mark.parametrize("order", [1, 2])
 def test_the_regressor_is_the_coarse_one_through_the_reference_model(order):
     model, ao, phase, frequency = ReferenceModel(bandwidth=60.0, damping=0.7), 80.0, 0.9, 12.0
-    symbols = {"ao": ca.SX(ao), "bandwidth": ca.SX(model.bandwidth)}
     signals = harmonic_signals(
-        OSCILLATOR, symbols, ca.SX([phase, frequency]), ca.SX(2 * 0.7 * 60.0)
+        OSCILLATOR,
+        ca.SX([phase, frequency]),
+        static=ca.SX(ao),
+        model=ca.SX(model.polynomial[1:]),
     )
     both = ca.Function("both", [], [signals.coarse, signals.regressor])()
     coarse, regressor = (both[name].full().ravel() for name in ("o0", "o1"))
@@ -110,7 +112,7 @@ def test_the_regressor_is_the_coarse_one_through_the_reference_model(order):
 
 
 def test_regressors_have_the_force_asked_for():
-    values = oscillator_values(OSCILLATOR, observer_pole=300.0, bandwidth=300.0, b0=800.0)
+    values = oscillator_values(OSCILLATOR, unit_force=300.0**3 / 800.0)
     # b0 D φ with φ ≈ 1/(ao ω²) far below the bandwidth.
     sizes = 800.0 * np.asarray(values["harmonic_scaling"]) / (300.0 * 300.0**2)
     np.testing.assert_allclose(sizes, OSCILLATOR.force)

@@ -60,14 +60,19 @@ def test_is_the_sum_of_its_parts(robot, violence):
     p = controller.parameter_values
     axes = list(zip(axis_parts(step, now.state), now.force, now.reference, strict=True))
     command = np.array([float(controller.command(*axis, p)) for axis in axes])
-    wanted = (
-        linearisation.torque(now.q, now.qd, now.force, command, linearisation.parameter_values)
+    wanted, held = (
+        linearisation.torque(now.q, now.qd, now.force, u, linearisation.parameter_values)
         .full()
         .ravel()
+        for u in (command, np.zeros_like(command))
     )
-    limit = step.robot.effort_limits
+    limit, commanded = step.robot.effort_limits, wanted - held
+    outward = (np.abs(wanted) > limit) & (np.sign(wanted) == np.sign(commanded))
+    excess = np.abs(wanted) - limit
+    cut = min(1.0, max((excess / np.abs(commanded))[outward], default=0.0))
+    expected = np.clip(wanted - cut * commanded, -limit, limit)
     # Sines differ in their last bits, and commands of 1e3 m/s² cancel against the rest.
-    np.testing.assert_allclose(now.torque, np.clip(wanted, -limit, limit), rtol=1e-12, atol=1e-10)
+    np.testing.assert_allclose(now.torque, expected, rtol=1e-11, atol=1e-9)
     np.testing.assert_allclose(now.signals["command"], command, rtol=1e-13)
     applied = now.signals["applied_command"]
     following = [
@@ -77,6 +82,27 @@ def test_is_the_sum_of_its_parts(robot, violence):
     np.testing.assert_allclose(now.next_state, np.concatenate(following), rtol=1e-13, atol=1e-15)
     saturated = bool(np.any(np.abs(wanted) > limit))
     assert saturated == (violence == 1.0), "the two cases are meant to differ in this"
+
+
+@pytest.mark.parametrize("robot", ROBOTS)
+def test_a_robot_that_can_hold_itself_keeps_the_direction_of_the_command(robot):
+    step, linearisation = robot_step(robot), linearisation_of(robot)
+    found = 0
+    for seed in range(20):
+        now = Situation(step, seed, violence=0.1)
+        command = now.signals["command"]
+        held = linearisation.torque(
+            now.q, now.qd, now.force, np.zeros_like(command), linearisation.parameter_values
+        )
+        able = bool(np.all(np.abs(held.full().ravel()) < step.robot.effort_limits))
+        limited = bool(np.any(np.abs(now.torque) >= step.robot.effort_limits * (1 - 1e-12)))
+        if able and limited:
+            found += 1
+            share = now.signals["applied_command"] / command
+            # One number for all axes, to the rounding of an inverted mass matrix.
+            np.testing.assert_allclose(share, share.mean(), rtol=1e-7)
+            assert 0.0 <= share.mean() < 1.0
+    assert found, "the situations are meant to saturate"
 
 
 @given(seed=st.integers(0, 2**32 - 1), robot=st.sampled_from(ROBOTS))

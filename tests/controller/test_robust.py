@@ -23,7 +23,7 @@ from mrac_design.controller.robust import (
     WithLeakage,
     WithProjection,
 )
-from mrac_design.design import ReferenceModel, RSTSpecification, design_rst
+from mrac_design.design import ReferenceModel, RSTSpecification, design_rst, first_order_observer
 from mrac_design.errors import ParameterError
 from mrac_design.motion.reference import constant_force
 from mrac_design.motion.signal import PiecewisePolynomial
@@ -174,7 +174,7 @@ DESIGN = design_rst(
     RSTSpecification(
         plant=ForcePlant(stiffness=800.0, velocity_gain=50.0),
         reference_model=ReferenceModel(bandwidth=500.0, damping=1.0),
-        observer_pole=500.0,
+        observer=first_order_observer(500.0),
     )
 )
 

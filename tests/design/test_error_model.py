@@ -19,6 +19,7 @@ from mrac_design.design import (
     UnitStaticGain,
     WellDampedRegion,
     design_rst_exact,
+    first_order_observer,
     place_poles_exact,
     relative_degree_two_error_model,
     unfiltered_error_model,
@@ -37,7 +38,7 @@ EXAMPLE = design_rst_exact(
     RSTSpecification(
         plant=ForcePlant(stiffness=2.0, velocity_gain=1.0),
         reference_model=ReferenceModel(bandwidth=1.0, damping=0.7),
-        observer_pole=2.0,
+        observer=first_order_observer(2.0),
     )
 )
 

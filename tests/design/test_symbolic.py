@@ -6,11 +6,10 @@ import numpy as np
 import pytest
 
 from mrac_design.design import (
-    IntegralRSTSpecification,
     ReferenceModel,
     RSTSpecification,
-    design_integral_rst_exact,
     design_rst_exact,
+    first_order_observer,
     integral_rst_closed_form,
     integral_rst_sensitivities,
     rst_closed_form,
@@ -22,9 +21,12 @@ from tests.oracles import diophantine_rational as oracle
 
 PLANT = ForcePlant(stiffness=812.5, velocity_gain=37.1)
 MODEL = ReferenceModel(bandwidth=431.0, damping=0.83)
-SIMPLE = RSTSpecification(plant=PLANT, reference_model=MODEL, observer_pole=617.3)
-INTEGRAL = IntegralRSTSpecification(
-    plant=PLANT, reference_model=MODEL, observer_bandwidth=555.5, observer_damping=1.1
+SIMPLE = RSTSpecification(plant=PLANT, reference_model=MODEL, observer=first_order_observer(617.3))
+INTEGRAL = RSTSpecification(
+    plant=PLANT,
+    reference_model=MODEL,
+    observer=(1.0, 1222.1, 308580.25),
+    internal_model=(1.0, 0.0),
 )
 VALUES = {"K2": 37.1, "Ks": 812.5, "omega": 431.0, "xi": 0.83}
 
@@ -33,8 +35,8 @@ def test_closed_forms_take_the_values_of_the_exact_designs():
     simple = design_rst_exact(SIMPLE)
     found = rst_closed_form().at({**VALUES, "ao": 617.3})
     assert found == (simple.R[0], simple.S[1], simple.S[0], simple.T[1], simple.T[0])
-    integral = design_integral_rst_exact(INTEGRAL)
-    found = integral_rst_closed_form().at({**VALUES, "omega_o": 555.5, "xi_o": 1.1})
+    integral = design_rst_exact(INTEGRAL)
+    found = integral_rst_closed_form().at({**VALUES, "alpha1": 1222.1, "alpha2": 308580.25})
     expected = [integral.R[1], *integral.S.coeffs()[::-1], *integral.T.coeffs()[::-1]]
     assert list(found) == expected
 
@@ -43,9 +45,7 @@ def test_latex_in_the_letters_of_the_field():
     text = rst_closed_form()._repr_latex_()
     assert r"r_{1} &= 2 \omega \xi+a_o-K_2" in text
     assert r"s_{1} &= \frac{\omega^{2} a_o}{K_s}" in text
-    assert (
-        r"s_{2} &= \frac{\omega^{2} \omega_o^{2}}{K_s}" in integral_rst_closed_form()._repr_latex_()
-    )
+    assert r"s_{2} &= \frac{\omega^{2} \alpha_2}{K_s}" in integral_rst_closed_form()._repr_latex_()
 
 
 def test_sensitivities_are_the_slopes_of_the_closed_form():
@@ -84,7 +84,7 @@ def test_relative_sensitivity_of_a_vanishing_coefficient_is_not_a_number():
     at_zero = RSTSpecification(
         plant=ForcePlant(stiffness=1.0, velocity_gain=3.0),
         reference_model=ReferenceModel(bandwidth=1.0, damping=1.0),
-        observer_pole=1.0,
+        observer=first_order_observer(1.0),
     )
     table = rst_sensitivities(at_zero)
     assert np.isnan(table.relative[0]).all()

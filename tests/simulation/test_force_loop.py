@@ -10,7 +10,7 @@ from mrac_design.controller.adaptation import NormalisedGradientLaw
 from mrac_design.controller.adaptive import AdaptiveRST, build_step, nominal_gains
 from mrac_design.controller.linearisation import RobotModelError, build_linearisation
 from mrac_design.controller.reference import ModelInverse
-from mrac_design.design import ReferenceModel, RSTSpecification, design_rst
+from mrac_design.design import ReferenceModel, RSTSpecification, design_rst, first_order_observer
 from mrac_design.errors import ParameterError, SimulationError, SingularPostureError
 from mrac_design.motion.signal import PiecewisePolynomial, quintic_hermite, stack
 from mrac_design.plant import ForcePlant
@@ -28,7 +28,7 @@ DESIGN = design_rst(
     RSTSpecification(
         plant=ForcePlant(stiffness=STIFFNESS, velocity_gain=50.0),
         reference_model=ReferenceModel(bandwidth=500.0, damping=1.0),
-        observer_pole=500.0,
+        observer=first_order_observer(500.0),
     )
 )
 
@@ -163,7 +163,7 @@ def test_frozen_force_error_is_the_disturbance_sensitivity(dynamics, true_stiffn
     late = slice(200, None)
     error = (outputs["force"] - outputs["model_force"])[late]
     open_loop = s * (s + 50) * (s + DESIGN.r1)
-    closed = open_loop + true_stiffness * (DESIGN.s0 * s + DESIGN.s1)
+    closed = open_loop + true_stiffness * (DESIGN.S[0] * s + DESIGN.S[1])
     sensitivity = open_loop / closed
     expected = abs(sensitivity) * true_stiffness * amplitude
     # Samples every 5 ms see the peak of an 8 rad/s sine to (ω h)²/8 = 2e-4.

@@ -13,7 +13,7 @@ from mrac_design.controller.adaptive import AdaptiveRST, build_step, nominal_gai
 from mrac_design.controller.reference import DirectReference
 from mrac_design.controller.rivals.active_observer import active_observer
 from mrac_design.controller.rivals.linear import build_linear_step
-from mrac_design.design import ReferenceModel, RSTSpecification, design_rst
+from mrac_design.design import ReferenceModel, RSTSpecification, design_rst, first_order_observer
 from mrac_design.errors import ParameterError
 from mrac_design.motion.reference import constant_force
 from mrac_design.motion.signal import PiecewisePolynomial
@@ -35,7 +35,7 @@ DESIGN = design_rst(
     RSTSpecification(
         plant=ForcePlant(stiffness=STIFFNESS, velocity_gain=VELOCITY_GAIN),
         reference_model=ReferenceModel(bandwidth=300.0, damping=1.0),
-        observer_pole=400.0,
+        observer=first_order_observer(400.0),
     )
 )
 

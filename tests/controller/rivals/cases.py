@@ -11,6 +11,7 @@ from mrac_design.controller.rivals.active_observer import (
     active_observer,
 )
 from mrac_design.controller.rivals.beat_preview import BeatPreview, beat_preview_step
+from mrac_design.controller.rivals.fixed_rst import FixedRST, fixed_rst
 from mrac_design.controller.rivals.harmonics import BeatObserver
 from mrac_design.controller.rivals.learning import IterativeLearning, iterative_learning
 from mrac_design.controller.rivals.linear import build_linear_step
@@ -20,8 +21,7 @@ from mrac_design.controller.rivals.predictive_observer import (
     PredictiveObserver,
     predictive_observer,
 )
-from mrac_design.controller.rivals.rst_integral import IntegralRST, integral_rst
-from mrac_design.design import ReferenceModel
+from mrac_design.design import ReferenceModel, RSTSpecification, design_rst
 from mrac_design.plant import ForcePlant
 from mrac_design.time_domain import Continuous, Discrete
 
@@ -30,10 +30,15 @@ PLANT = ForcePlant(stiffness=STIFFNESS, velocity_gain=VELOCITY_GAIN)
 DOMAIN = Discrete(PERIOD)
 PREFILTER = ReferenceModel(bandwidth=50.0, damping=1.0)
 
-RST = IntegralRST(
-    plant=PLANT,
-    reference_model=ReferenceModel(bandwidth=300.0, damping=1.0),
-    observer=ReferenceModel(bandwidth=250.0, damping=0.9),
+RST = FixedRST(
+    design=design_rst(
+        RSTSpecification(
+            plant=PLANT,
+            reference_model=ReferenceModel(bandwidth=300.0, damping=1.0),
+            observer=(1.0, 2 * 0.9 * 250.0, 250.0**2),
+            internal_model=(1.0, 0.0),
+        )
+    ),
     prefilter=PREFILTER,
     feedforward=ModelInverse(),
     time_domain=Continuous(),
@@ -104,8 +109,8 @@ PREVIEW = BeatPreview(
 def linear_rivals():
     """(name, controller) of every rival that is linear."""
     return {
-        "integral RST": integral_rst(RST),
-        "sampled integral RST": integral_rst(replace(RST, time_domain=DOMAIN)),
+        "integral RST": fixed_rst(RST),
+        "sampled integral RST": fixed_rst(replace(RST, time_domain=DOMAIN)),
         "active observer": active_observer(OBSERVER),
         "active observer of order 2": active_observer(
             replace(OBSERVER, force_loop=replace(FORCE_LOOP, order=2, drive=0.1))

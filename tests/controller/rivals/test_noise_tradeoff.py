@@ -20,7 +20,7 @@ from mrac_design.controller.rivals.active_observer import ObserverTuning, active
 from mrac_design.controller.rivals.linear import build_linear_step
 from mrac_design.controller.rivals.prediction import Horizon
 from mrac_design.controller.rivals.predictive_observer import predictive_observer
-from mrac_design.design import ReferenceModel, RSTSpecification, design_rst
+from mrac_design.design import ReferenceModel, RSTSpecification, design_rst, first_order_observer
 from mrac_design.motion.reference import constant_force
 from mrac_design.motion.signal import quintic_hermite
 from mrac_design.simulation.run import RunSettings
@@ -46,7 +46,7 @@ DESIGN = design_rst(
     RSTSpecification(
         plant=PLANT,
         reference_model=ReferenceModel(bandwidth=500.0, damping=1.0),
-        observer_pole=500.0,
+        observer=first_order_observer(500.0),
     )
 )
 FAST = ObserverTuning(order=1, time_constant=0.0015, drive=4.0, input_noise=0.0, force_noise=0.02)

@@ -1,4 +1,4 @@
-"""RST with integrator: closed form, poles, disturbance rejection, no windup."""
+"""RST with fixed gains: closed form with an integrator, poles, disturbances, no windup."""
 
 from __future__ import annotations
 
@@ -9,12 +9,14 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from mrac_design.controller.rivals.rst_integral import design_integral_rst, integral_rst
-from mrac_design.design import ReferenceModel
+from mrac_design.controller.rivals.fixed_rst import fixed_rst
+from mrac_design.design import ReferenceModel, RSTSpecification, design_rst
 from mrac_design.plant import ForcePlant
 from mrac_design.time_domain import Discrete
 from tests.controller.rivals.cases import RST, STIFFNESS, VELOCITY_GAIN
 from tests.oracles import sampled_force_loop as loop
+
+SPECIFICATION = RST.design.specification
 
 
 @settings(max_examples=30, deadline=None)
@@ -27,12 +29,12 @@ from tests.oracles import sampled_force_loop as loop
     ξo=st.floats(0.4, 2),
 )
 def test_coefficients_have_the_closed_form(Ks, K2, ω, ξ, ωo, ξo):
-    design = design_integral_rst(
-        replace(
-            RST,
+    design = design_rst(
+        RSTSpecification(
             plant=ForcePlant(stiffness=Ks, velocity_gain=K2),
             reference_model=ReferenceModel(bandwidth=ω, damping=ξ),
-            observer=ReferenceModel(bandwidth=ωo, damping=ξo),
+            observer=(1.0, 2 * ξo * ωo, ωo**2),
+            internal_model=(1.0, 0.0),
         )
     )
     α1, α2 = 2 * ξo * ωo, ωo**2
@@ -45,8 +47,8 @@ def test_coefficients_have_the_closed_form(Ks, K2, ω, ξ, ωo, ξo):
 
 
 def test_the_continuous_loop_has_the_poles_of_ao_and_am():
-    rows, command = integral_rst(RST).matrices()
-    system = integral_rst(RST).feedback()
+    rows, command = fixed_rst(RST).matrices()
+    system = fixed_rst(RST).feedback()
     A = np.array([[0.0, 1.0], [0.0, -VELOCITY_GAIN]])
     b, c = np.array([0.0, STIFFNESS]), np.array([1.0, 0.0])
     closed = np.block(
@@ -56,7 +58,11 @@ def test_the_continuous_loop_has_the_poles_of_ao_and_am():
         ]
     )
     wanted = np.concatenate(
-        [np.roots(RST.reference_model.polynomial), np.roots(RST.observer.polynomial), [-50, -50]]
+        [
+            np.roots(SPECIFICATION.reference_model.polynomial),
+            np.roots(SPECIFICATION.observer),
+            [-50, -50],
+        ]
     )
     found = np.poly(np.linalg.eigvals(closed))
     np.testing.assert_allclose(found, np.poly(wanted), rtol=1e-8)
@@ -65,7 +71,7 @@ def test_the_continuous_loop_has_the_poles_of_ao_and_am():
 
 def test_a_constant_push_at_the_input_leaves_no_error():
     h = 2e-4
-    rows, command = integral_rst(replace(RST, time_domain=Discrete(h))).matrices()
+    rows, command = fixed_rst(replace(RST, time_domain=Discrete(h))).matrices()
     phi, gamma = loop.plant(STIFFNESS, VELOCITY_GAIN, h)
     forces = loop.run(
         rows, command, phi, gamma, 0,
@@ -78,7 +84,7 @@ def test_a_constant_push_at_the_input_leaves_no_error():
 
 def test_a_command_limit_does_not_wind_it_up():
     h, limit = 1e-3, 3.0
-    controller = integral_rst(replace(RST, time_domain=Discrete(h)))
+    controller = fixed_rst(replace(RST, time_domain=Discrete(h)))
     rows, command = controller.matrices()
     phi, gamma = loop.plant(STIFFNESS, VELOCITY_GAIN, h)
     state, x = np.zeros(rows.shape[0]), np.array([0.0, 0.0])
