@@ -49,7 +49,7 @@ class AdaptationLoop:
         model = specification.reference_model
         p, Am = _POLYNOMIAL_P, model.exact_polynomial
         omega, xi = decimal_rational(model.bandwidth), decimal_rational(model.damping)
-        Ao = fmpq_poly([decimal_rational(specification.observer_pole), 1])
+        Ao = fmpq_poly([decimal_rational(value) for value in reversed(specification.observer)])
         loop = self.design.loop
         BS, AR = loop.process.B * loop.S, loop.process.A * loop.R
         if self.speed == 0:
@@ -78,9 +78,11 @@ class AdaptationLoop:
 
 
 def regressor_square(design: RSTDesign, force: float, bias_force: float) -> float:
-    """|φ̂₀|² (N²) at rest at a constant `force` (N): s1 and t1 see ω F0/ao, the bias its own."""
+    """|φ̂₀|² (N²) at rest at a constant `force` (N): sn and tn see the force through D, 1/Ao and
+    1/Am (ω F0/ao without internal model), the bias its own."""
     specification = design.specification
-    ratio = specification.reference_model.bandwidth / specification.observer_pole
+    static = specification.observer[-1] * specification.reference_model.bandwidth**2
+    ratio = specification.plant.b0 * design.scaling[-1] / static
     return 2 * (ratio * force) ** 2 + bias_force**2
 
 
@@ -107,7 +109,7 @@ def _speed_per_gain(design: RSTDesign, adaptation: AdaptationChoice, force: floa
 
 
 def noise_drift(design: RSTDesign, *, rms: float, period: float) -> FloatArray:
-    """E[φ̂ ε] (N²) of (r1', s0, s1) under sensor noise at zero force, gains at nominal.
+    """E[φ̂ ε] (N²) of (r1', s0 … sn) under sensor noise at zero force, gains at nominal.
 
     Noise correlates with itself through the regressor, so the gains drift although nothing is to
     be learnt: dθ̂/dt starts at γ̂ω E[φ̂ε] (divided by α for the normalised law). `rms` (N) is the
@@ -120,10 +122,14 @@ def noise_drift(design: RSTDesign, *, rms: float, period: float) -> FloatArray:
     model, b0 = specification.reference_model, specification.plant.b0
     omega = model.bandwidth * np.geomspace(1e-5, 1e4, 6000)
     p = 1j * omega
-    AoAm = (p + specification.observer_pole) * np.polyval(model.polynomial, p)
+    Am, Ao = (np.polyval(q, p) for q in (model.polynomial, specification.observer))
+    AoAm = Ao * Am
     error = np.polyval(specification.plant.A, p) * np.polyval(design.R, p) / AoAm
     command = -np.polyval(design.S, p) / np.polyval(design.R, p) * error
-    regressor = (b0 * design.scaling[:3])[:, None] * np.array([command, p * error, error]) / AoAm
+    modelled = np.polyval(specification.internal_model, p) * command
+    powers = [p**i * error for i in range(specification.degree, -1, -1)]
+    scaling = b0 * design.scaling[: specification.degree + 2]
+    regressor = scaling[:, None] * np.array([modelled, *powers]) / AoAm
     # A sample held for one period: the density falls off as sinc².
     density = rms**2 * period * np.sinc(omega * period / (2 * math.pi)) ** 2
     cross = np.real(regressor * error.conj()) * density * omega / math.pi

@@ -93,7 +93,7 @@ def _started_at(loop: AxisLoop, *, gain: float, start: FloatArray, stiffness: fl
     """Parameters with another γ̂, other feedback gains at the start and another tissue."""
     layout = loop.step.parameters
     values = layout.split(np.array(loop.step.parameter_values))
-    first = [*start, *values["initial_gains"][3:]]
+    first = [*start, *values["initial_gains"][len(start) :]]
     own = layout.pack({**values, "adaptation_gain": gain, "initial_gains": first})
     parts = loop.system.parameters.split(np.array(loop.with_controller_parameters(own)))
     return loop.system.parameters.pack({**parts, "stiffness": stiffness})

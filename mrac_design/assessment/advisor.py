@@ -90,7 +90,7 @@ class GainAdvice:
     bounds: tuple[GainBound, ...]
     """Every bound."""
     drift: FloatArray
-    """Rates (1/s) at which noise alone moves (r1', s0, s1) at zero force with the chosen γ̂."""
+    """Rates (1/s) at which noise alone moves (r1', s0 … sn) at zero force with the chosen γ̂."""
     time_to_border: float
     """Time (s) until that drift takes a gain out of the certified box; inf without a drift,
     nan without a box."""
@@ -154,7 +154,7 @@ def advise_gain(
 
 
 def projection_box(box: ParameterBox) -> GainBox:
-    """The certified box for a projection of (r1', s0, s1), scaled; t0, t1 stay free.
+    """The certified box for a projection of (r1', s0 … sn), scaled; t0 … tn stay free.
 
     Rounded inward, so that every float in it is inside what was proved.
     """
@@ -308,7 +308,7 @@ def axis_controller(
 
 def with_bandwidth(scenario: Scenario, *, bandwidth: float) -> Scenario:
     """The scenario with its design moved to another bandwidth (rad/s), ao = ω, K2 kept."""
-    design = replace(scenario.design, bandwidth=bandwidth, observer_pole=bandwidth)
+    design = replace(scenario.design, bandwidth=bandwidth).with_observer_pole(bandwidth)
     return replace(scenario, design=design)
 
 
@@ -323,7 +323,7 @@ def _drift(scenario: Scenario, design: RSTDesign, needs: Requirements) -> FloatA
 def _time_to_border(design: RSTDesign, drift: FloatArray, box: GainBox | None) -> float:
     if box is None:
         return math.nan
-    nominal = design.scaled_parameters[:3]
+    nominal = design.scaled_parameters[: len(drift)]
     room = np.where(drift > 0, np.array(box.upper) - nominal, nominal - np.array(box.lower))
     with np.errstate(divide="ignore"):
         return float(np.min(np.where(drift != 0, room / np.abs(drift), math.inf)))

@@ -11,17 +11,16 @@ from mrac_design.assessment.advisor import axis_controller, with_bandwidth
 from mrac_design.assessment.choices import StabilityChoices
 from mrac_design.assessment.linearisation import certificate_gap
 from mrac_design.controller.adaptive import build_step
+from mrac_design.controller.axis_loop import axis_loop
 from mrac_design.design import RSTDesign
 from mrac_design.errors import ParameterError
 from mrac_design.polynomials.rationals import decimal_rational
 from mrac_design.simulation.scenario import Scenario
 from mrac_design.simulation.single_axis import build_axis_loop, build_sampled_axis_loop
 from mrac_design.stability import (
-    AdaptiveLoop,
     DesignMap,
     Sampling,
     StabilityCertificate,
-    adaptive_loop,
     certify,
     design_map,
     relative_box,
@@ -65,18 +64,6 @@ def sampled_design(scenario: Scenario, choices: StabilityChoices) -> CertifiedDe
     return _certified(title, moved, sampled.timing, sampled.box, choices)
 
 
-def axis_loop(design: RSTDesign) -> AdaptiveLoop:
-    """What the judge is told of a design: numbers only."""
-    specification = design.specification
-    return adaptive_loop(
-        design_stiffness=decimal_rational(specification.plant.stiffness),
-        velocity_gain=decimal_rational(specification.plant.velocity_gain),
-        bandwidth=decimal_rational(specification.reference_model.bandwidth),
-        observer_pole=decimal_rational(specification.observer_pole),
-        gains=tuple(float(gain) for gain in design.parameters[:3]),
-    )
-
-
 def map_of_designs(
     scenario: Scenario,
     choices: StabilityChoices,
@@ -89,7 +76,10 @@ def map_of_designs(
         for bandwidth in choices.map.bandwidths
     ]
     return design_map(
-        [axis_loop(design) for design in designs],
+        [
+            axis_loop(design, dict.fromkeys(s.period for s in choices.map.samplings))
+            for design in designs
+        ],
         choices.map.samplings,
         choices.tissue,
         resolution=decimal_rational(choices.map.resolution),
@@ -164,7 +154,7 @@ def _certified(
     title: str, scenario: Scenario, timing: Timing, box: float, choices: StabilityChoices
 ) -> CertifiedDesign:
     design = scenario_design(scenario)
-    loop = axis_loop(design)
+    loop = axis_loop(design, [timing.period] if isinstance(timing, Sampling) else ())
     certificate = certify(loop, relative_box(loop, decimal_rational(box), choices.tissue), timing)
     return CertifiedDesign(
         title=title,

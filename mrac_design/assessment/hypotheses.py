@@ -215,7 +215,7 @@ def _gains_in_box(
         for side in (certificate.box.lower, certificate.box.upper)
     )
     nominal = np.array([to_float(v) for v in certificate.loop.scaled_gains])
-    paths = np.vstack([part.gains[:, :3] for part in signals])
+    paths = np.vstack([part.gains[:, : len(nominal)] for part in signals])
     inside = bool(((paths >= lower) & (paths <= upper)).all())
     farthest = float(np.abs(paths / nominal - 1).max())
     allowed = float(np.abs(upper / nominal - 1).max())
@@ -223,8 +223,8 @@ def _gains_in_box(
         name="gains inside the certified box",
         status=Status.CHECKED if inside else Status.VIOLATED,
         evidence=(
-            f"r1', s0, s1 stay within ±{100 * farthest:.3g} % of nominal in this run, the box is "
-            f"±{100 * allowed:.3g} %; only a projection makes sure of it"
+            f"the feedback gains stay within ±{100 * farthest:.3g} % of nominal in this run, the "
+            f"box is ±{100 * allowed:.3g} %; only a projection makes sure of it"
         ),
     )
 
@@ -314,11 +314,12 @@ def _measurement(study: StudyRecord) -> Hypothesis:
 def _stable_polynomials(study: StudyRecord) -> Hypothesis:
     specification = study.design.specification
     model = specification.reference_model
-    Ao = fmpq_poly([decimal_rational(specification.observer_pole), 1])
+    Ao = fmpq_poly([decimal_rational(value) for value in reversed(specification.observer)])
+    coefficients = ", ".join(f"{value:g}" for value in specification.observer)
     return decided(
         "Ao and Am stable",
         is_hurwitz(Ao * model.exact_polynomial),
-        f"Ao = p + {specification.observer_pole:g}; Am with ω = {model.bandwidth:g} rad/s, "
+        f"Ao with coefficients {coefficients}; Am with ω = {model.bandwidth:g} rad/s, "
         f"ξ = {model.damping:g}",
     )
 

@@ -17,6 +17,7 @@ from scipy.linalg import expm
 
 from mrac_design.arrays import FloatArray, readonly
 from mrac_design.errors import ParameterError
+from mrac_design.layout import Layout
 from mrac_design.simulation.single_axis import AxisLoop, resting_axis
 from mrac_design.stability import AdaptiveLoop, Sampling, StabilityCertificate
 from mrac_design.stability.certificate import vertices_of
@@ -116,13 +117,13 @@ def certificate_gap(certificate: StabilityCertificate, loop: AxisLoop) -> float:
     for corner, A in ends:
         values = np.array([int(v.p) / int(v.q) for v in corner])
         parts = loop.system.parameters.split(np.array(loop.parameter_values))
-        stiffness = values[3] * _float(certificate.loop.design_stiffness)
+        stiffness = values[-1] * _float(certificate.loop.design_stiffness)
         p = loop.system.parameters.pack({**parts, "stiffness": stiffness})
         count = loop.step.state.slices["gains"].stop - loop.step.state.slices["gains"].start
         gains = np.zeros(count)
-        gains[:3] = values[:3]
+        gains[: len(values) - 1] = values[:-1]
         found = linearise_axis(loop, force=0.0, gains=readonly(gains), parameters=p)
-        S = _scaling(certificate, found.names)
+        S = _scaling(certificate, found.names, loop.step.state)
         unit = 1.0 if found.period else 1 / _float(certificate.loop.bandwidth)
         gap = unit * S @ found.matrix - A @ S
         # Columns that the certificate's state does not contain must not act on it at all.
@@ -158,17 +159,23 @@ def _vertex_matrices(certificate: StabilityCertificate) -> list[FloatArray]:
     return [to_floats(vertex.A) for vertex in vertices]
 
 
-def _scaling(certificate: StabilityCertificate, names: tuple[str, ...]) -> FloatArray:
+def _scaling(
+    certificate: StabilityCertificate, names: tuple[str, ...], controller: Layout
+) -> FloatArray:
     """S with (ŷ, Ẑ, x̂u, x̂y, û_{k−1}, …) = S · (state of the linearised loop)."""
     axis: AdaptiveLoop = certificate.loop
     b0, omega = _float(axis.design_stiffness), _float(axis.bandwidth)
     delay = certificate.timing.delay if isinstance(certificate.timing, Sampling) else 0
     first = names.index("controller[0]")
+    powers = [
+        (chain, k, unit * omega ** (k + 1))
+        for chain, unit in (("filtered_command", b0 / omega**2), ("filtered_force", 1.0))
+        for k in range(axis.degree)
+    ]
     wanted = [
         ("position", b0),
         ("velocity", b0 / omega),
-        (names[first], b0 / omega),
-        (names[first + 3], omega),
+        *((names[first + controller.slices[chain].start + k], unit) for chain, k, unit in powers),
         *((f"pipeline[{k}]" if delay else "pipeline", b0 / omega**2) for k in range(delay)),
     ]
     S = np.zeros((len(wanted), len(names)))

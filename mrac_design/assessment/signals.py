@@ -16,15 +16,13 @@ from dataclasses import dataclass
 
 import numpy as np
 from scipy.integrate import trapezoid
-from scipy.signal import lfilter, lsim
+from scipy.signal import lsim
 
 from mrac_design.arrays import FloatArray, readonly
-from mrac_design.design import RSTDesign
+from mrac_design.controller.filter_chains import chain_equations
+from mrac_design.design import RSTDesign, RSTSpecification
 from mrac_design.errors import ParameterError
 from mrac_design.simulation.trajectory import Trajectory
-
-MODEL_GAINS = 5
-"""Adapted gains that the error model knows: r1', s0, s1, t0, t1; a bias counts as disturbance."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -36,9 +34,9 @@ class AdaptationSignals:
     time: FloatArray
     """Instants (s), (N,), after settling."""
     regressor: FloatArray
-    """φ̂ (N), (N, 5)."""
+    """φ̂ (N) of (r1', s0 … sn, t0 … tn), (N, 2n + 3); a bias counts as disturbance."""
     gains: FloatArray
-    """θ̂ used, (N, 5)."""
+    """θ̂ used, (N, 2n + 3)."""
     augmented_error: FloatArray
     """ε as recorded (N), (N,)."""
     rebuilt_error: FloatArray
@@ -68,7 +66,7 @@ class Excitation:
     centres: FloatArray
     """Middle of every window (s), (w,)."""
     eigenvalues: FloatArray
-    """Eigenvalues of ∫ φ̂ φ̂ᵀ dt / T (N²), ascending, (w, 5)."""
+    """Eigenvalues of ∫ φ̂ φ̂ᵀ dt / T (N²), ascending, (w, 2n + 3)."""
     mean_square: float
     """Mean of |φ̂|² over the run (N²)."""
 
@@ -138,27 +136,24 @@ def _axis_signals(
     kept: np.ndarray,
 ) -> AdaptationSignals:
     specification = design.specification
-    model, ao, b0 = (
-        specification.reference_model,
-        specification.observer_pole,
-        specification.plant.b0,
-    )
+    model, b0 = specification.reference_model, specification.plant.b0
+    D, c = np.array(specification.internal_model), specification.adapted_pole
     period = float(np.median(np.diff(trajectory.time)))
-    omega, damping = model.bandwidth, model.damping
     force, command, model_force = (
         trajectory[name][:, index] for name in ("force", "command", "model_force")
     )
-    low = _LowPass(period=period)
-    xu, xy = low.first(command, ao), low.first(force, ao)
-    zu1, zu2 = low.second(xu, omega, damping)
-    zy1, zy2 = low.second(xy, omega, damping)
+    on_command, on_force, on_model = (
+        _Powers.of(specification, values, period) for values in (command, force, model_force)
+    )
+    modelled, driven = on_command.after_model[:, 1:] @ D, on_command.after_model[:, :-1] @ D
     # ym has passed Am already, so uc/(Ao Am) is ym/(ω² Ao).
-    xc = low.first(model_force, ao) / omega**2
-    phi = np.stack([zu2, zy1, zy2, -(model_force / omega**2 - ao * xc), -xc], axis=1)
-    regressor = b0 * design.scaling[:MODEL_GAINS] * phi
-    gains = trajectory["adapted_gains"][:, index * count : (index + 1) * count][:, :MODEL_GAINS]
-    caused = (regressor * (design.scaled_parameters[:MODEL_GAINS] - gains)).sum(axis=1)
-    augmentation = -(b0 * (zu1 + ao * zu2) + (regressor * gains).sum(axis=1))
+    reference = on_model.before_model / model.bandwidth**2
+    phi = np.column_stack([modelled, on_force.after_model, -reference])
+    regressor = b0 * design.scaling * phi
+    own = len(design.scaling)
+    gains = trajectory["adapted_gains"][:, index * count : index * count + own]
+    caused = (regressor * (design.scaled_parameters - gains)).sum(axis=1)
+    augmentation = -(b0 * (driven + c * modelled) + (regressor * gains).sum(axis=1))
     return AdaptationSignals(
         axis=axis,
         time=readonly(trajectory.time[kept]),
@@ -171,29 +166,27 @@ def _axis_signals(
 
 
 @dataclass(frozen=True, slots=True)
-class _LowPass:
-    """Exact responses of 1/(p + a) and (p, 1)/Am to piecewise linear inputs, from rest."""
+class _Powers:
+    """Powers of p, highest first, of a filtered signal v."""
 
-    period: float
+    before_model: FloatArray
+    """pⁱ v/Ao for i = n … 0, (N, n + 1)."""
+    after_model: FloatArray
+    """pⁱ v/(Ao Am) for i = n … 0, (N, n + 1)."""
 
-    def first(self, values: FloatArray, pole: float) -> FloatArray:
-        """Response of 1/(p + pole), which starts settled on the first value."""
-        a = np.exp(-pole * self.period)
-        # ∫ of the ramp from v_k to v_{k+1} against exp: two weights.
-        total = (1 - a) / pole
-        later = (self.period - total) / (pole * self.period)
-        start = values[0] / pole
-        driven = (total - later) * values[:-1] + later * values[1:]
-        response, _ = lfilter([1.0], [1.0, -a], driven, zi=[a * start])
-        return np.concatenate([[start], response])
-
-    def second(
-        self, values: FloatArray, omega: float, damping: float
-    ) -> tuple[FloatArray, FloatArray]:
-        """Responses of p/Am and 1/Am, which start settled on the first value."""
-        A = [[-2 * damping * omega, -(omega**2)], [1.0, 0.0]]
-        system = (A, [[1.0], [0.0]], np.eye(2), np.zeros((2, 1)))
-        time = self.period * np.arange(len(values))
-        start = [0.0, values[0] / omega**2]
-        response = lsim(system, values, time, X0=start)[1]
-        return response[:, 0], response[:, 1]
+    @classmethod
+    def of(cls, specification: RSTSpecification, values: FloatArray, period: float) -> _Powers:
+        """Exact responses to a piecewise linear v that start settled on its first value."""
+        n, (A, B) = specification.degree, chain_equations(specification)
+        start = np.linalg.solve(A, -B[:, 0] * values[0])
+        system = (A, B, np.eye(n + 2), np.zeros((n + 2, 1)))
+        time = period * np.arange(len(values))
+        states = lsim(system, values, time, X0=start)[1]
+        filtered = states[:, :n]
+        highest = values - filtered @ np.array(specification.observer[1:])
+        damping, stiffness = specification.reference_model.polynomial[1:]
+        powers = [states[:, n + 1], states[:, n]]
+        for i in range(2, n + 1):  # Am z = v/Ao
+            known = damping * powers[i - 1] + stiffness * powers[i - 2]
+            powers.append(filtered[:, n + 1 - i] - known)
+        return cls(np.column_stack([highest, filtered]), np.column_stack(powers[::-1]))

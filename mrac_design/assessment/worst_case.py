@@ -17,6 +17,7 @@ from numpy.typing import NDArray
 from scipy.linalg import expm
 
 from mrac_design.arrays import FloatArray, readonly
+from mrac_design.assessment.axis_filters import axis_filters
 from mrac_design.errors import ParameterError
 from mrac_design.stability import Sampling, StabilityCertificate
 from mrac_design.stability.exact_matrix import to_floats
@@ -146,12 +147,12 @@ def worst_cases(
 
 
 def _points(certificate: StabilityCertificate, rng: np.random.Generator) -> FloatArray:
-    """SI values (r1', s0, s1, Ks): all corners of the box, then points inside, (c, 4)."""
+    """SI values (r1', s0, …, sn, Ks): all corners of the box, then points inside, (c, n + 3)."""
     loop, box = certificate.loop, certificate.box
     units = np.array([*(to_float(d) for d in loop.gain_scale), to_float(loop.design_stiffness)])
     corners = np.array([[to_float(v) for v in corner] for corner in box.corners()])
     low, high = corners.min(axis=0), corners.max(axis=0)
-    inside = low + (high - low) * rng.random((16, 4))
+    inside = low + (high - low) * rng.random((16, len(low)))
     return np.asarray(np.vstack([corners, inside]) * units)
 
 
@@ -165,61 +166,66 @@ def _spans(certificate: StabilityCertificate, points: FloatArray) -> _Spans:
 def _continuous_spans(
     certificate: StabilityCertificate, points: FloatArray, corners: int
 ) -> _Spans:
-    K2, ao = (to_float(v) for v in (certificate.loop.velocity_gain, certificate.loop.observer_pole))
-    r, s0, s1, Ks = points.T
-    block = np.zeros((len(points), 5, 5))
+    filters = axis_filters(certificate.loop)
+    n, (chain, drive) = filters.degree, filters.flow
+    own = 2 + 2 * n
+    block = np.zeros((len(points), own + 1, own + 1))
     block[:, 0, 1] = 1
-    command = np.stack([-s0 * Ks, 0 * r, -r, s0 * ao - s1], axis=1)
-    block[:, 1, :4], block[:, 2, :4] = command, command
-    block[:, 1, 1] -= K2
-    block[:, 1, 4] = -1
-    block[:, 2, 2] -= ao
-    block[:, 3, 0], block[:, 3, 3] = Ks, -ao
+    block[:, 1, 1], block[:, 1, own] = -to_float(certificate.loop.velocity_gain), -1
+    block[:, 2 : 2 + n, 2 : 2 + n] = block[:, 2 + n : own, 2 + n : own] = chain
+    for matrix, point in zip(block, points, strict=True):
+        command = filters.command(point)
+        matrix[1, :own] += command
+        matrix[2 : 2 + n, :own] += drive @ command[None]
+    block[:, 2 + n, 0] = points[:, -1]
     duration = SPAN / to_float(certificate.loop.bandwidth)
     flow = expm(block * (duration / SUBSTEPS))
-    force = np.zeros((len(points), 4))
-    force[:, 0] = Ks
-    return _composed(flow[:, :4, :4], flow[:, :4, 4], force, corners, duration, sampled=False)
+    force = np.zeros((len(points), own))
+    force[:, 0] = points[:, -1]
+    return _composed(
+        flow[:, :own, :own], flow[:, :own, own], force, corners, duration, sampled=False
+    )
 
 
 def _sampled_spans(
     certificate: StabilityCertificate, timing: Sampling, points: FloatArray, corners: int
 ) -> _Spans:
     """One sampling period: the command is read off at its start, applied `delay` later, held."""
-    K2, ao = (to_float(v) for v in (certificate.loop.velocity_gain, certificate.loop.observer_pole))
-    period, size = to_float(timing.period), 4 + timing.delay
+    filters = axis_filters(certificate.loop)
+    n, (chain, drive) = filters.degree, filters.flow
+    own = 2 + 2 * n
+    period, size = to_float(timing.period), own + timing.delay
     plant = np.zeros((4, 4))
-    plant[0, 1], plant[1, 1], plant[1, 2], plant[1, 3] = 1, -K2, 1, -1
+    plant[0, 1], plant[1, 2:] = 1, (1, -1)
+    plant[1, 1] = -to_float(certificate.loop.velocity_gain)
     part = expm(plant * (period / SUBSTEPS))
-    b = np.exp(-ao * period)
-    f = (1 - b) / ao
-    count = len(points)
-    # State within the period: (ξ, ξ', applied command); before it: (ξ, ξ', xu, xy, u₋₁, …).
+    held = expm(np.block([[chain, drive], [np.zeros((1, n + 1))]]) * period)
+    move, push = held[:n, :n], held[:n, n]
+    count, unit = len(points), np.eye(size)
+    # State within the period: (ξ, ξ', applied command); before it: (ξ, ξ', x_u, x_y, u₋₁, …).
     begin = np.zeros((count, 3, size))
-    filters = np.zeros((count, size - 2, size))
+    later = np.zeros((count, size - 2, size))
     force = np.zeros((count, 3))
-    for i, (r, s0, s1, Ks) in enumerate(points):
-        command = np.zeros(size)
-        command[[0, 2, 3]] = -s0 * Ks, -r, s0 * ao - s1
-        applied = np.eye(size)[size - 1] if timing.delay else command
-        begin[i] = np.vstack([np.eye(size)[:2], applied])
-        filters[i, 0] = f * command + b * np.eye(size)[2]
-        filters[i, 1, [0, 3]] = f * Ks, b
+    for i, point in enumerate(points):
+        command = np.concatenate([filters.command(point), np.zeros(timing.delay)])
+        begin[i] = np.vstack([unit[:2], unit[size - 1] if timing.delay else command])
+        later[i, :n, 2 : 2 + n] = later[i, n : 2 * n, 2 + n : own] = move
+        later[i, :n] += np.outer(push, command)
+        later[i, n : 2 * n, 0] += push * point[-1]
         if timing.delay:
-            filters[i, 2] = command
-            filters[i, 3:] = np.eye(size)[4 : size - 1]
-        force[i, 0] = Ks
-    move = np.eye(3)
-    move[:2] = part[:2, :3]
-    steps = np.tile(move, (count, 1, 1))
+            later[i, 2 * n] = command
+            later[i, 2 * n + 1 :] = unit[own : size - 1]
+        force[i, 0] = point[-1]
+    steps = np.eye(3)
+    steps[:2] = part[:2, :3]
     inside = _composed(
-        steps, np.tile(np.array([*part[:2, 3], 0.0]), (count, 1)), force, corners, period,
-        sampled=True,
+        np.tile(steps, (count, 1, 1)), np.tile(np.array([*part[:2, 3], 0.0]), (count, 1)), force,
+        corners, period, sampled=True,
     )  # fmt: skip
     effect = np.zeros((count, size, SUBSTEPS))
     effect[:, :2] = inside.effect[:, :2]
     return _Spans(
-        transition=np.concatenate([inside.transition[:, :2] @ begin, filters], axis=1),
+        transition=np.concatenate([inside.transition[:, :2] @ begin, later], axis=1),
         effect=effect,
         rows=inside.rows @ begin,
         direct=inside.direct,
@@ -351,9 +357,10 @@ def _slowest_decay(
 
 
 def _state_scale(certificate: StabilityCertificate) -> FloatArray:
-    """Scaled state over SI state: (ŷ, Ẑ, x̂u, x̂y, û…) = scale · (ξ, ξ', xu, xy, u…)."""
+    """Scaled state over SI state: (ŷ, Ẑ, x̂u, x̂y, û…) = scale · (ξ, ξ', x_u, x_y, u…)."""
     b0, omega = (
         to_float(v) for v in (certificate.loop.design_stiffness, certificate.loop.bandwidth)
     )
     delay = certificate.timing.delay if isinstance(certificate.timing, Sampling) else 0
-    return np.array([b0, b0 / omega, b0 / omega, omega, *[b0 / omega**2] * delay])
+    filters, command = omega ** np.arange(1.0, certificate.loop.degree + 1), b0 / omega**2
+    return np.array([b0, b0 / omega, *(command * filters), *filters, *[command] * delay])

@@ -35,25 +35,21 @@ def certify(
 
     Exit status: 0 when proved, 1 when not (nothing is written then).
     """
-    from mrac_design.stability.adaptive_loop import adaptive_loop, relative_box
+    from mrac_design.controller.axis_loop import axis_loop
     from mrac_design.stability.certificate_file import write_certificate
     from mrac_design.stability.certification import certify as prove
     from mrac_design.stability.certification import largest_box
-    from mrac_design.stability.sampled_loop import sampling
+    from mrac_design.stability.parameter_box import relative_box
+    from mrac_design.stability.sampled_loop import Sampling, sampling
     from mrac_design.study import scenario_design
     from mrac_design.time_domain import Continuous
     from mrac_design.verdict import Verdict
 
     scenario = options.chosen()
-    design, choice = scenario_design(scenario), scenario.design
-    loop = adaptive_loop(
-        design_stiffness=choice.stiffness,
-        velocity_gain=choice.velocity_gain,
-        bandwidth=choice.bandwidth,
-        observer_pole=choice.observer_pole,
-        gains=tuple(design.parameters[:3]),
-    )
+    choice = scenario.design
     timing = Continuous() if rate is None else sampling(f"1/{rate}", delay)
+    periods = [timing.period] if isinstance(timing, Sampling) else []
+    loop = axis_loop(scenario_design(scenario), periods)
     tissue = (softest or choice.stiffness, stiffest or choice.stiffness)
     fraction = box or largest_box(loop, tissue, timing, resolution="0.01").fraction
     certificate = prove(loop, relative_box(loop, fraction, tissue), timing)

@@ -5,10 +5,9 @@ Nothing here knows how a controller was designed: the judge takes numbers, not d
 
 from mrac_design.stability.adaptive_loop import (
     AdaptiveLoop,
-    ParameterBox,
+    FilterStep,
     adaptive_loop,
-    projection_bounds,
-    relative_box,
+    filter_step,
 )
 from mrac_design.stability.certificate import StabilityCertificate
 from mrac_design.stability.certificate_file import (
@@ -25,6 +24,7 @@ from mrac_design.stability.factorisation import (
     factorisations,
 )
 from mrac_design.stability.hypotheses import Hypothesis, Status
+from mrac_design.stability.parameter_box import ParameterBox, projection_bounds, relative_box
 from mrac_design.stability.positive_real import (
     Kind,
     PositiveRealness,
@@ -56,6 +56,7 @@ __all__ = [
     "DesignMap",
     "Factorisation",
     "FactorisationTable",
+    "FilterStep",
     "Hypothesis",
     "Kind",
     "LargestBox",
@@ -81,6 +82,7 @@ __all__ = [
     "design_map",
     "factorisations",
     "feedforward_theorem",
+    "filter_step",
     "gains_hash",
     "largest_box",
     "positive_real",

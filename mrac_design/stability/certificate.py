@@ -10,27 +10,21 @@ from __future__ import annotations
 from dataclasses import dataclass
 from math import log, sqrt
 
-import numpy as np
-from flint import fmpq, fmpq_mat, fmpq_poly
+from flint import fmpq
 
 from mrac_design.errors import ParameterError
-from mrac_design.polynomials.stable import is_hurwitz
-from mrac_design.stability.adaptive_loop import (
-    AdaptiveLoop,
-    ParameterBox,
-    Vertex,
-    continuous_vertices,
-)
+from mrac_design.stability.adaptive_loop import AdaptiveLoop
 from mrac_design.stability.claims import Claim, DecayClaim, EnergyClaim, PeakClaim, first_failure
-from mrac_design.stability.exact_matrix import to_floats
 from mrac_design.stability.inequalities import Increment, derivative, difference
+from mrac_design.stability.parameter_box import ParameterBox
 from mrac_design.stability.rational_function import to_float
 from mrac_design.stability.sampled_loop import (
     Sampling,
-    exponentials,
     hold_terms,
     sampled_vertices,
+    velocity_exponential,
 )
+from mrac_design.stability.vertices import Vertex, continuous_vertices
 from mrac_design.time_domain import Continuous
 from mrac_design.verdict import Verdict
 
@@ -151,26 +145,8 @@ def increment_of(timing: Timing) -> Increment:
     return derivative if isinstance(timing, Continuous) else difference
 
 
-def unstable_corner(loop: AdaptiveLoop, box: ParameterBox, timing: Timing) -> str | None:
-    """A corner at which the loop with frozen gains is unstable, with its worst eigenvalue."""
-    for vertex in vertices_of(loop, box, timing):
-        eigenvalues = np.linalg.eigvals(to_floats(vertex.A))
-        if isinstance(timing, Sampling):
-            worst = float(np.abs(eigenvalues).max())
-            if worst >= 1:
-                return f"{vertex.label} (a pole of modulus {worst:.6g})"
-        elif not is_hurwitz(_characteristic_polynomial(vertex)):
-            worst = float(eigenvalues.real.max() * to_float(loop.bandwidth))
-            return f"{vertex.label} (a pole with real part {worst:.6g} 1/s)"
-    return None
-
-
-def _characteristic_polynomial(vertex: Vertex) -> fmpq_poly:
-    return fmpq_mat(vertex.A.tolist()).charpoly()
-
-
 def _held_response(loop: AdaptiveLoop, timing: Sampling) -> fmpq:
     """ŷ after one period of d̂ = 1: bounds what the heart adds between two samples."""
-    a = exponentials(loop, timing).velocity[0]
+    a = velocity_exponential(loop, timing)[0]
     period = timing.period * loop.bandwidth
     return hold_terms(a, loop.scaled_velocity_gain, period)[1]

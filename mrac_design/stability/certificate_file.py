@@ -21,10 +21,10 @@ from mrac_design.errors import CertificateError
 from mrac_design.stability.adaptive_loop import AdaptiveLoop, ExactArray
 from mrac_design.stability.certificate import StabilityCertificate
 from mrac_design.stability.claims import Claim, DecayClaim, EnergyClaim
-from mrac_design.stability.sampled_loop import Sampling, energy_input, exponentials
+from mrac_design.stability.sampled_loop import Sampling, energy_input, velocity_exponential
 from mrac_design.verdict import Verdict
 
-FORMAT = "mrac-design stability certificate 1"
+FORMAT = "mrac-design stability certificate 2"
 """Name and version of the format."""
 
 
@@ -68,10 +68,14 @@ def certificate_schema() -> dict[str, Any]:
 
 
 def gains_hash(loop: AdaptiveLoop) -> str:
-    """SHA-256 of the axis and its nominal gains as `name=rational` lines, in hexadecimal."""
+    """SHA-256 of the axis and its nominal gains, in hexadecimal: lines `name=rational`, several
+    rationals of a name with a space between, sorted by name."""
     numbers = _loop(loop)
-    text = "".join(f"{name}={numbers[name]}\n" for name in sorted(numbers))
-    return hashlib.sha256(text.encode()).hexdigest()
+    lines = (
+        f"{name}={value if isinstance(value, str) else ' '.join(value)}\n"
+        for name, value in sorted(numbers.items())
+    )
+    return hashlib.sha256("".join(lines).encode()).hexdigest()
 
 
 def digest(pointer: str, value: str) -> str:
@@ -79,32 +83,31 @@ def digest(pointer: str, value: str) -> str:
     return hashlib.sha256(f"{pointer}\n{value}".encode()).hexdigest()[:16]
 
 
-def _loop(loop: AdaptiveLoop) -> dict[str, str]:
-    r, s0, s1 = loop.gains
-    named = {
-        "bandwidth": loop.bandwidth,
-        "design_stiffness": loop.design_stiffness,
-        "observer_pole": loop.observer_pole,
-        "r1_minus_ao": r,
-        "s0": s0,
-        "s1": s1,
-        "velocity_gain": loop.velocity_gain,
+def _loop(loop: AdaptiveLoop) -> dict[str, str | list[str]]:
+    return {
+        "bandwidth": str(loop.bandwidth),
+        "design_stiffness": str(loop.design_stiffness),
+        "gain_scale": _strings(loop.gain_scale),
+        "gains": _strings(loop.gains),
+        "internal_model": _strings(loop.internal_model),
+        "observer": _strings(loop.observer),
+        "velocity_gain": str(loop.velocity_gain),
     }
-    return {name: str(value) for name, value in named.items()}
 
 
 def _timing(certificate: StabilityCertificate) -> dict[str, Any]:
-    timing = certificate.timing
+    loop, timing = certificate.loop, certificate.timing
     if not isinstance(timing, Sampling):
         return {"kind": "continuous"}
-    bounds = exponentials(certificate.loop, timing)
+    bounds, step = velocity_exponential(loop, timing), loop.filter_step(timing.period)
     return {
         "kind": "sampled",
         "period": str(timing.period),
         "delay": str(timing.delay),
-        "velocity_exponential": _strings(bounds.velocity),
-        "observer_exponential": _strings(bounds.observer),
-        "energy_input": _matrix(energy_input(certificate.loop, timing, bounds)),
+        "velocity_exponential": _strings(bounds),
+        "observer_transition": [_strings(row) for row in step.transition],
+        "observer_input": _strings(step.input),
+        "energy_input": _matrix(energy_input(loop, timing, bounds)),
     }
 
 

@@ -3,27 +3,21 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from math import ceil, floor, log10, sqrt
 from typing import TypeVar
 
+import numpy as np
 from flint import fmpq
 
 from mrac_design.arrays import FloatArray
 from mrac_design.errors import ParameterError
 from mrac_design.polynomials.rationals import Number
-from mrac_design.stability.adaptive_loop import (
-    AdaptiveLoop,
-    ParameterBox,
-    Vertex,
-    exact,
-    relative_box,
-)
+from mrac_design.stability.adaptive_loop import AdaptiveLoop, exact
 from mrac_design.stability.certificate import (
     StabilityCertificate,
     Timing,
     increment_of,
-    unstable_corner,
     vertices_of,
 )
 from mrac_design.stability.claims import (
@@ -34,7 +28,7 @@ from mrac_design.stability.claims import (
     PeakClaim,
     first_failure,
 )
-from mrac_design.stability.exact_matrix import rounded_symmetric
+from mrac_design.stability.coordinates import Coordinates, balanced
 from mrac_design.stability.inequalities import (
     Corner,
     Increment,
@@ -44,14 +38,19 @@ from mrac_design.stability.inequalities import (
     floating_corner,
     peak_blocks,
 )
+from mrac_design.stability.instability import unstable_corner
+from mrac_design.stability.parameter_box import ParameterBox, relative_box
 from mrac_design.stability.semidefinite import Blocks, Candidate, least_scalar, widest_margin
+from mrac_design.stability.vertices import Vertex
 from mrac_design.time_domain import Continuous
 from mrac_design.verdict import Verdict
 
 GainClaim = TypeVar("GainClaim", EnergyClaim, PeakClaim)
 
-ROUNDING_BITS = 44
-"""Binary places a Lyapunov matrix keeps below its largest entry."""
+LEAST_DECAY = fmpq(1, 10**6)
+"""Fall of V that counts as one, relative, per unit of scaled time or per sample."""
+DECAY_STEPS = 128
+"""Steps in which the decay is bisected, up to that of the slowest frozen pole."""
 PEAK_RATES = (0.15, 0.35, 0.55, 0.7, 0.85)
 """Shares of the certified decay tried as the rate of the peak bound."""
 SLACKS = (1.002, 1.02, 1.2)
@@ -64,8 +63,31 @@ class _Polytope:
 
     increment: Increment
     vertices: tuple[Vertex, ...]
+    floating: tuple[Corner, ...]
+    """The corners of the gains, each once: the bounds of the exponential are 2⁻⁹⁵ apart."""
+    coordinates: Coordinates
+    """What the solver works in."""
     corners: tuple[Corner, ...]
-    size: int
+    """The corners as the solver sees them."""
+
+    @property
+    def size(self) -> int:
+        return len(self.floating[0].A)
+
+    @property
+    def frozen_decay(self) -> float:
+        """Decay of V that poles frozen at a corner allow at best, in floats; a search is vain
+        where it is not positive."""
+        poles = np.linalg.eigvals(np.array([corner.A for corner in self.floating]))
+        if self.increment is derivative:
+            return float(-2 * poles.real.max())
+        return float(1 - np.abs(poles).max() ** 2)
+
+    def fitted(self, claim: DecayClaim) -> _Polytope:
+        """The same in coordinates that suit a Lyapunov matrix of the loop."""
+        coordinates = self.coordinates.fitted(claim.P)
+        corners = coordinates.corners(self.floating)
+        return replace(self, coordinates=coordinates, corners=corners)
 
     def proved(self, claim: Claim) -> bool:
         return first_failure(claim, self.increment, self.vertices) is None
@@ -75,13 +97,15 @@ def certify(loop: AdaptiveLoop, box: ParameterBox, timing: Timing) -> StabilityC
     """Stability, decay rate and gains of the adaptive loop over the box, as far as provable.
 
     The verdict is PROVED when a rounded Lyapunov matrix passes the exact check at every corner,
-    REFUTED when the loop with gains frozen at a corner is unstable (continuous time), UNDECIDED
-    otherwise. Needs cvxpy and Clarabel.
+    REFUTED when the loop with gains frozen at a corner is proved unstable, UNDECIDED otherwise.
+    Needs cvxpy and Clarabel.
     """
     polytope = _polytope(loop, box, timing)
-    decay = _fastest_decay(polytope)
-    if decay is None:
+    first = _decay_at(polytope, LEAST_DECAY) if polytope.frozen_decay > 0 else None
+    if first is None:
         return _without_proof(loop, box, timing)
+    polytope = polytope.fitted(first)
+    decay = _fastest_decay(polytope, first)
     continuous = isinstance(timing, Continuous)
     return StabilityCertificate(
         loop=loop,
@@ -101,7 +125,8 @@ def certify(loop: AdaptiveLoop, box: ParameterBox, timing: Timing) -> StabilityC
 
 def has_common_lyapunov_function(loop: AdaptiveLoop, box: ParameterBox, timing: Timing) -> bool:
     """Whether a common quadratic Lyapunov function was found and proved; False proves nothing."""
-    return _decay_at(_polytope(loop, box, timing), 0.0) is not None
+    polytope = _polytope(loop, box, timing)
+    return polytope.frozen_decay > 0 and _decay_at(polytope, LEAST_DECAY) is not None
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -144,13 +169,15 @@ def largest_box(
 
 def _polytope(loop: AdaptiveLoop, box: ParameterBox, timing: Timing) -> _Polytope:
     vertices = vertices_of(loop, box, timing)
-    # The solver sees each gain corner once; the bounds of the exponentials are 2⁻⁹⁵ apart.
     distinct = vertices[: sum(1 for _ in box.corners())]
+    floating = tuple(floating_corner(vertex) for vertex in distinct)
+    coordinates = balanced([corner.A for corner in floating])
     return _Polytope(
         increment=increment_of(timing),
         vertices=vertices,
-        corners=tuple(floating_corner(vertex) for vertex in distinct),
-        size=vertices[0].A.shape[0],
+        floating=floating,
+        coordinates=coordinates,
+        corners=coordinates.corners(floating),
     )
 
 
@@ -160,7 +187,7 @@ def _without_proof(loop: AdaptiveLoop, box: ParameterBox, timing: Timing) -> Sta
     verdict = Verdict.UNDECIDED
     if corner is not None:
         reason = f"the loop with gains frozen in a corner of the box is unstable: {corner}"
-        verdict = Verdict.REFUTED if isinstance(timing, Continuous) else Verdict.UNDECIDED
+        verdict = Verdict.REFUTED
     return StabilityCertificate(
         loop=loop,
         box=box,
@@ -174,15 +201,14 @@ def _without_proof(loop: AdaptiveLoop, box: ParameterBox, timing: Timing) -> Sta
     )
 
 
-def _fastest_decay(polytope: _Polytope) -> DecayClaim | None:
-    """The largest proved decay, by bisection."""
-    best = _decay_at(polytope, 0.0)
-    if best is None:
-        return None
-    low, high = 0.0, 2.0 if polytope.increment is derivative else 1.0
-    for _ in range(7):
-        middle = (low + high) / 2
-        claim = _decay_at(polytope, middle)
+def _fastest_decay(polytope: _Polytope, first: DecayClaim) -> DecayClaim:
+    """The largest proved decay, by bisection from a first proof."""
+    best = first
+    step = _rounded_up(polytope.frozen_decay) / DECAY_STEPS
+    low, high = 0, DECAY_STEPS
+    while high - low > 1:
+        middle = (low + high) // 2
+        claim = _decay_at(polytope, middle * step)
         if claim is None:
             high = middle
         else:
@@ -190,31 +216,35 @@ def _fastest_decay(polytope: _Polytope) -> DecayClaim | None:
     return best
 
 
-def _decay_at(polytope: _Polytope, rate: float) -> DecayClaim | None:
+def _decay_at(polytope: _Polytope, rate: fmpq) -> DecayClaim | None:
+    floating = int(rate.p) / int(rate.q)
+    corners = polytope.corners
+
     def blocks(P: FloatArray, _: float) -> list[FloatArray]:
         found = [P]
-        for corner in polytope.corners:
-            found += decay_blocks(polytope.increment, corner, P, rate)
+        for corner in corners:
+            found += decay_blocks(polytope.increment, corner, P, floating)
         return found
 
     candidate = widest_margin(blocks, polytope.size)
     if candidate is None:
         return None
-    exact_rate = fmpq(*rate.as_integer_ratio()) if rate else fmpq(1, 10**6)
-    claim = DecayClaim(P=rounded_symmetric(candidate.P, ROUNDING_BITS), rate=exact_rate)
+    claim = DecayClaim(P=polytope.coordinates.form(candidate.P), rate=rate)
     return claim if polytope.proved(claim) else None
 
 
 def _least_energy_gain(polytope: _Polytope, output: Output) -> EnergyClaim | None:
+    corners = polytope.corners
+
     def blocks(P: FloatArray, squared: float) -> list[FloatArray]:
         found = [P]
-        for corner in polytope.corners:
+        for corner in corners:
             row = output.row(corner)
             found += energy_blocks(polytope.increment, corner, P, row, squared)
         return found
 
     def claim(candidate: Candidate, gain: fmpq) -> EnergyClaim:
-        P = rounded_symmetric(candidate.P, ROUNDING_BITS)
+        P = polytope.coordinates.form(candidate.P)
         return EnergyClaim(P=P, output=output, gain=gain)
 
     least = least_scalar(blocks, polytope.size)
@@ -234,11 +264,11 @@ def _least_peak_gain(polytope: _Polytope, decay: fmpq) -> PeakClaim | None:
 
 
 def _peak_blocks(polytope: _Polytope, rate: fmpq) -> Blocks:
-    floating = int(rate.p) / int(rate.q)
+    corners, floating = polytope.corners, int(rate.p) / int(rate.q)
 
     def blocks(P: FloatArray, squared: float) -> list[FloatArray]:
         found = [P]
-        for corner in polytope.corners:
+        for corner in corners:
             found += peak_blocks(polytope.increment, corner, P, floating, squared)
         return found
 
@@ -247,7 +277,7 @@ def _peak_blocks(polytope: _Polytope, rate: fmpq) -> Blocks:
 
 def _peak_at(polytope: _Polytope, rate: fmpq, squared: float) -> PeakClaim | None:
     def claim(candidate: Candidate, gain: fmpq) -> PeakClaim:
-        return PeakClaim(P=rounded_symmetric(candidate.P, ROUNDING_BITS), rate=rate, gain=gain)
+        return PeakClaim(P=polytope.coordinates.form(candidate.P), rate=rate, gain=gain)
 
     return _proved_gain(polytope, _peak_blocks(polytope, rate), claim, squared)
 

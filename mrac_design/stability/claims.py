@@ -8,7 +8,7 @@ from enum import Enum
 
 from flint import fmpq
 
-from mrac_design.stability.adaptive_loop import ExactArray, Vertex
+from mrac_design.stability.adaptive_loop import ExactArray
 from mrac_design.stability.exact_matrix import is_positive_definite
 from mrac_design.stability.inequalities import (
     Corner,
@@ -19,6 +19,7 @@ from mrac_design.stability.inequalities import (
     exact_corner,
     peak_blocks,
 )
+from mrac_design.stability.vertices import Vertex
 
 
 class Output(Enum):
@@ -70,7 +71,7 @@ class PeakClaim:
     """|force| <= gain · sup |d̂|, from rest, for every such path."""
 
     P: ExactArray
-    """Matrix (n, n) of the invariant ellipsoid V <= 1."""
+    """Matrix (n, n) with |force|² <= V; the ellipsoid V <= gain² is invariant under |d̂| <= 1."""
     rate: fmpq
     """Fall of V outside the ellipsoid, > 0."""
     gain: fmpq

@@ -55,7 +55,7 @@ def design_map(
     """The largest certified box of every loop under every sampling.
 
     `progress(done, total)` is called after each. Raises ParameterError for empty sequences.
-    Each entry costs a bisection of semidefinite programs, about 0.3 s.
+    Each entry costs a bisection of semidefinite programs, about 0.3 s for the smallest loops.
     """
     if not loops or not samplings:
         raise ParameterError(

@@ -16,8 +16,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from mrac_design.stability.adaptive_loop import Vertex
 from mrac_design.stability.exact_matrix import to_floats
+from mrac_design.stability.vertices import Vertex
 
 Matrix = NDArray[Any]
 """A matrix of float64 or of `fmpq`; the formulas are the same."""
@@ -100,16 +100,12 @@ def energy_blocks(
 def peak_blocks(
     increment: Increment, corner: Corner, P: Matrix, rate: Any, squared_gain: Any
 ) -> list[Matrix]:
-    """{V <= 1} is invariant under |d̂| <= 1, and |force|² <= squared_gain on it."""
+    """{V <= squared_gain} is invariant under |d̂| <= 1, and |force|² <= V everywhere."""
     n = P.shape[0]
     blocks = []
     for column in corner.disturbances:
         block = -increment(P, corner.A, column)
         block[:n, :n] = block[:n, :n] - rate * P
-        block[n, n] = block[n, n] + rate
+        block[n, n] = block[n, n] + rate * squared_gain
         blocks.append(block)
-    for row in corner.force:
-        bound = np.empty((1, 1), dtype=P.dtype)
-        bound[0, 0] = squared_gain
-        blocks.append(np.block([[P, row.T], [row, bound]]))
-    return blocks
+    return [*blocks, *(P - row.T @ row for row in corner.force)]

@@ -90,7 +90,8 @@ def _solved(problem: Any) -> bool:
 
 
 def _coefficients(blocks: Blocks, size: int) -> list[tuple[int, FloatArray, FloatArray]]:
-    """(m, slopes (m², unknowns + 1), constant (m²,)) of every block, by evaluation on a basis."""
+    """(m, slopes (m², unknowns + 1), constant (m²,)) of every distinct block, by evaluation on a
+    basis."""
     zero = np.zeros((size, size))
     constant = [np.asarray(block, float) for block in blocks(zero, 0.0)]
     columns = []
@@ -99,11 +100,12 @@ def _coefficients(blocks: Blocks, size: int) -> list[tuple[int, FloatArray, Floa
         basis[i, j] = basis[j, i] = 1.0
         columns.append(blocks(basis, 0.0))
     columns.append(blocks(zero, 1.0))
-    table = []
+    table = {}
     for k, base in enumerate(constant):
         slopes = np.stack([(column[k] - base).ravel() for column in columns], axis=1)
-        table.append((base.shape[0], slopes, base.ravel()))
-    return table
+        # Corners that differ in nothing a block depends on give the same block.
+        table[slopes.tobytes(), base.tobytes()] = (base.shape[0], slopes, base.ravel())
+    return list(table.values())
 
 
 def _places(size: int) -> list[tuple[int, int]]:

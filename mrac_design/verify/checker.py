@@ -14,7 +14,7 @@ from flint import fmpq, fmpq_mat
 from mrac_design.verify.document import DocumentError, Reader, broken_seals, places
 from mrac_design.verify.loop import Corner, Loop, corners, read_loop
 
-FORMAT = "mrac-design stability certificate 1"
+FORMAT = "mrac-design stability certificate 2"
 OUTPUTS = {"energy of force": "force", "energy of linearised command": "command"}
 
 
@@ -73,7 +73,7 @@ def verify_certificate(path: Path | str) -> Report:
 def _proved(reader: Reader) -> Iterator[str]:
     """One sentence for every claim decided; DocumentError at the first that fails."""
     if reader.value("/format") != FORMAT:
-        raise DocumentError("/format", f"must be '{FORMAT}'")
+        raise DocumentError("/format", f"must be '{FORMAT}'; make the certificate again")
     _check_gains_hash(reader)
     loop = read_loop(reader)
     polytope = corners(reader, loop)
@@ -88,9 +88,13 @@ def _check_gains_hash(reader: Reader) -> None:
     loop = reader.value("/loop")
     if not isinstance(loop, dict):
         raise DocumentError("/loop", "must be an object")
-    text = "".join(f"{name}={loop[name]}\n" for name in sorted(loop))
+    text = "".join(f"{name}={_joined(loop[name])}\n" for name in sorted(loop))
     if hashlib.sha256(text.encode()).hexdigest() != reader.value("/gains_hash"):
         raise DocumentError("/gains_hash", "is not the hash of the gains in /loop")
+
+
+def _joined(value: object) -> str:
+    return " ".join(map(str, value)) if isinstance(value, list) else str(value)
 
 
 def _decide(reader: Reader, pointer: str, loop: Loop, polytope: list[Corner]) -> str:
@@ -103,15 +107,15 @@ def _decide(reader: Reader, pointer: str, loop: Loop, polytope: list[Corner]) ->
         rate = _positive_number(reader, f"{pointer}/rate")
         blocks = ((c, _change(loop, P, c.A, None) + rate * P) for c in polytope)
         _all_negative(pointer, blocks)
-        return f"V decreases by at least {rate} V per {loop.step} at {len(polytope)} corners"
+        return f"V decreases by at least {rate} V per {loop.unit} at {len(polytope)} corners"
     gain = _positive_number(reader, f"{pointer}/gain")
     if name in OUTPUTS:
         _all_negative(pointer, _energy_blocks(loop, P, polytope, OUTPUTS[name], gain))
         return f"energy of the {OUTPUTS[name]} at most ({gain})² times that of the disturbance"
     if name == "peak of force":
         rate = _positive_number(reader, f"{pointer}/rate")
-        _all_negative(pointer, _invariance_blocks(loop, P, polytope, rate))
-        _all_negative(pointer, _peak_blocks(P, polytope, gain))
+        _all_negative(pointer, _invariance_blocks(loop, P, polytope, rate, gain))
+        _all_negative(pointer, _peak_blocks(P, polytope))
         return f"force at most {gain} times the largest disturbance"
     raise DocumentError(f"{pointer}/claim", f"unknown claim {name!r}")
 
@@ -129,22 +133,19 @@ def _energy_blocks(
 
 
 def _invariance_blocks(
-    loop: Loop, P: fmpq_mat, polytope: list[Corner], rate: fmpq
+    loop: Loop, P: fmpq_mat, polytope: list[Corner], rate: fmpq, gain: fmpq
 ) -> Iterator[tuple[Corner, fmpq_mat]]:
+    """Where V = xᵀPx exceeds gain² it falls, whatever the disturbance within ±1."""
     for corner, column in product(polytope, loop.disturbances):
-        yield (
-            corner,
-            _change(loop, P, corner.A, corner.held(column)) + _diagonal(rate * P, -rate, 1),
-        )
+        change = _change(loop, P, corner.A, corner.held(column))
+        yield corner, change + _diagonal(rate * P, -rate * gain**2, 1)
 
 
-def _peak_blocks(
-    P: fmpq_mat, polytope: list[Corner], gain: fmpq
-) -> Iterator[tuple[Corner, fmpq_mat]]:
-    # rowᵀ row <= gain² P says the same as the block with P and gain² on its diagonal.
+def _peak_blocks(P: fmpq_mat, polytope: list[Corner]) -> Iterator[tuple[Corner, fmpq_mat]]:
+    """The squared force is at most V."""
     for corner in polytope:
         for row in corner.force:
-            yield corner, row.transpose() * row - gain**2 * P
+            yield corner, row.transpose() * row - P
 
 
 def _change(loop: Loop, P: fmpq_mat, A: fmpq_mat, B: fmpq_mat | None) -> fmpq_mat:

@@ -1,12 +1,17 @@
 """The adaptive force axis rebuilt from the certificate's numbers.
 
-Written from the loop's equations, apart from the code that made the certificate. State
-x = (ŷ, Ẑ, x̂u, x̂y) and, when sampled, the commands still under way, newest first:
+Written from the loop's equations, apart from the code that made the certificate. The observer
+polynomial is Ao = pⁿ + a1 pⁿ⁻¹ + … + an, the given factor of R is D = pⁿ⁻¹ + d1 pⁿ⁻² + …, and the
+controller R u = −S y with R = (p + c + r) D, c = a1 − d1, S = s0 pⁿ + … + sn is written as
 
-    ŷ' = Ẑ      Ẑ' = v − K Ẑ − d      x̂u' = −c x̂u + û      x̂y' = −c x̂y + κ ŷ      force = κ ŷ
-    û = −r x̂u − s0 (κ ŷ − c x̂y) − s1 x̂y          v = û, or û of some samples ago
+    Ao-filtered:   (Ao + K + r D) u/Ao = −S y/Ao,   K = (p + c) D − Ao
 
-with K = K2/ω and c = ao/ω. Sampled, plant and filters hold their inputs for one period.
+State x = (ŷ, Ẑ, x̂u, x̂y) with x̂u, x̂y the n filtered powers of û and κ ŷ, highest first, and, when
+sampled, the commands still under way, newest first. In time ωt, force = κ ŷ and
+
+    ŷ' = Ẑ      Ẑ' = v − (K2/ω) Ẑ − d      v = û, or û of some samples ago
+
+Sampled, the plant holds its input for one period, and the filters advance by the stated step.
 """
 
 from __future__ import annotations
@@ -14,12 +19,17 @@ from __future__ import annotations
 from dataclasses import dataclass
 from itertools import product
 
-from flint import fmpq, fmpq_mat
+from flint import arb_mat, fmpq, fmpq_mat
 
 from mrac_design.verify.document import DocumentError, Reader
 
 SERIES_TERMS = 60
 """Terms of the alternating series for exp(−x), x <= 1/2: the last is below 10⁻⁹⁹."""
+LARGEST_DEGREE = 8
+"""Observers of a higher degree are refused; their corners would be too many to decide."""
+STEP_TOLERANCE = fmpq(1, 10**9)
+"""How far the stated step of the filters may be from the exact one, relative to its largest
+entry in scaled time: it is the definition of the filters, but must be recognisable as theirs."""
 
 
 @dataclass(frozen=True)
@@ -40,24 +50,54 @@ class Corner:
 
 
 @dataclass(frozen=True)
+class Controller:
+    """The controller in time ωt and force b0 u/ω²."""
+
+    observer: list[fmpq]
+    """a1 … an."""
+    factor: list[fmpq]
+    """1, d1 … of D, n entries."""
+    known: list[fmpq]
+    """K from the power n − 1 down, n entries, the first zero."""
+    units: list[fmpq]
+    """What the scaled gains of the box are multiplied by."""
+
+    @property
+    def degree(self) -> int:
+        """n."""
+        return len(self.observer)
+
+    def command(self, values: tuple[fmpq, ...]) -> list[fmpq]:
+        """û as a row on (ŷ, Ẑ, x̂u, x̂y) for gains and stiffness ratio of a corner."""
+        ratio = values[-1]
+        r, *s = [value * unit for value, unit in zip(values[:-1], self.units, strict=True)]
+        row = [-s[0] * ratio, fmpq(0)]
+        row += [-(k + r * d) for k, d in zip(self.known, self.factor, strict=True)]
+        row += [s[0] * a - later for a, later in zip(self.observer, s[1:], strict=True)]
+        return row
+
+
+@dataclass(frozen=True)
 class Loop:
     """What all corners share."""
 
     sampled: bool
     delay: int
     K: fmpq
-    c: fmpq
+    controller: Controller
     period: fmpq
     energy_input: fmpq_mat
-    exponentials: tuple[tuple[fmpq, ...], tuple[fmpq, ...]]
+    exponential: tuple[fmpq, ...]
+    step: tuple[fmpq_mat, list[fmpq]]
+    """Filters: companion matrix and input, or transition and held input."""
 
     @property
     def size(self) -> int:
         """Number of states."""
-        return 4 + self.delay
+        return 2 + 2 * self.controller.degree + self.delay
 
     @property
-    def step(self) -> str:
+    def unit(self) -> str:
         """What the decay is counted per."""
         return "sample" if self.sampled else "unit of ωt"
 
@@ -68,19 +108,22 @@ class Loop:
 
 
 def read_loop(reader: Reader) -> Loop:
-    """The loop's numbers, with the enclosures of a sampled one checked."""
+    """The loop's numbers, with the enclosure and the filter step of a sampled one checked."""
     omega = _positive(reader, "/loop/bandwidth")
-    _positive(reader, "/loop/design_stiffness")
-    pole = _positive(reader, "/loop/observer_pole")
     gain = reader.rational("/loop/velocity_gain")
     if gain < 0:
         raise DocumentError("/loop/velocity_gain", "must not be negative")
-    for name in ("r1_minus_ao", "s0", "s1"):
-        reader.rational(f"/loop/{name}")
+    controller = _controller(reader, omega)
+    n, K = controller.degree, gain / omega
+    companion = fmpq_mat(
+        [[-a for a in controller.observer]]
+        + [[fmpq(int(j == i)) for j in range(n)] for i in range(n - 1)]
+    )
+    flow = companion, [fmpq(1)] + [fmpq(0)] * (n - 1)
     kind = reader.value("/timing/kind")
     if kind == "continuous":
-        column = fmpq_mat(4, 1, [0, 1, 0, 0])
-        return Loop(False, 0, gain / omega, pole / omega, fmpq(0), column, ((), ()))
+        column = fmpq_mat(2 + 2 * n, 1, [0, 1] + [0] * (2 * n))
+        return Loop(False, 0, K, controller, fmpq(0), column, (), flow)
     if kind != "sampled":
         raise DocumentError("/timing/kind", "must be 'continuous' or 'sampled'")
     period = _positive(reader, "/timing/period")
@@ -88,73 +131,100 @@ def read_loop(reader: Reader) -> Loop:
     if delay not in (0, 1, 2, 3, 4):
         raise DocumentError("/timing/delay", "must be a whole number from 0 to 4")
     a = _enclosure(reader, "/timing/velocity_exponential", gain * period)
-    b = _enclosure(reader, "/timing/observer_exponential", pole * period)
-    energy = _energy_input(reader, gain / omega, period * omega, a, int(delay.p))
-    return Loop(True, int(delay.p), gain / omega, pole / omega, period * omega, energy, (a, b))
+    step = _filter_step(reader, omega, n)
+    _check_step(step, flow, period * omega)
+    energy = _energy_input(reader, K, period * omega, a, 2 * n + int(delay.p))
+    return Loop(True, int(delay.p), K, controller, period * omega, energy, a, step)
 
 
 def corners(reader: Reader, loop: Loop) -> list[Corner]:
-    """The loop at every corner of gains, stiffness ratio and enclosures."""
-    lower, upper = reader.rationals("/box/lower", 3), reader.rationals("/box/upper", 3)
+    """The loop at every corner of gains, stiffness ratio and enclosure."""
+    count = loop.controller.degree + 2
+    lower, upper = reader.rationals("/box/lower", count), reader.rationals("/box/upper", count)
     ratio = reader.rationals("/box/stiffness_ratio", 2)
     if any(a > b for a, b in zip(lower, upper, strict=True)):
         raise DocumentError("/box/lower", "exceeds /box/upper")
     if not 0 < ratio[0] <= ratio[1]:
         raise DocumentError("/box/stiffness_ratio", "needs 0 < lowest <= highest")
-    nominal = _nominal(reader)
-    for name, low, value, high in zip(("r1", "s0", "s1"), lower, nominal, upper, strict=True):
-        if not low <= value <= high:
-            raise DocumentError("/box/lower", f"the nominal gain {name} is outside the box")
+    gains = reader.rationals("/loop/gains", count)
+    scale = reader.rationals("/loop/gain_scale", count)
+    for k in range(count):
+        if not lower[k] <= gains[k] / scale[k] <= upper[k]:
+            raise DocumentError(f"/box/lower/{k}", "the nominal gain is outside the box")
     ends = [sorted(set(pair)) for pair in (*zip(lower, upper, strict=True), ratio)]
     if not loop.sampled:
         return [_continuous(loop, values) for values in product(*ends)]
-    bounds = [sorted(set(pair)) for pair in loop.exponentials]
-    return [_held(loop, values[:4], values[4], values[5]) for values in product(*ends, *bounds)]
+    held = product(product(*ends), sorted(set(loop.exponential)))
+    return [_held(loop, values, a) for values, a in held]
 
 
-def _nominal(reader: Reader) -> list[fmpq]:
-    omega = reader.rational("/loop/bandwidth")
-    b0 = reader.rational("/loop/design_stiffness")
-    r, s0, s1 = (reader.rational(f"/loop/{name}") for name in ("r1_minus_ao", "s0", "s1"))
-    return [r / omega, s0 * b0 / omega**2, s1 * b0 / omega**3]
-
-
-def _command(loop: Loop, values: tuple[fmpq, ...]) -> list[fmpq]:
-    r, s0, s1, ratio = values
-    return [-s0 * ratio, fmpq(0), -r, s0 * loop.c - s1, *([fmpq(0)] * loop.delay)]
+def _controller(reader: Reader, omega: fmpq) -> Controller:
+    b0 = _positive(reader, "/loop/design_stiffness")
+    stated = reader.value("/loop/observer")
+    n = len(stated) - 1 if isinstance(stated, list) else 0
+    if not 1 <= n <= LARGEST_DEGREE:
+        raise DocumentError("/loop/observer", f"needs a degree from 1 to {LARGEST_DEGREE}")
+    Ao = reader.rationals("/loop/observer", n + 1)
+    D = reader.rationals("/loop/internal_model", n)
+    for name, polynomial in (("observer", Ao), ("internal_model", D)):
+        if polynomial[0] != 1:
+            raise DocumentError(f"/loop/{name}/0", "must be 1")
+    reader.rationals("/loop/gains", n + 2)
+    units = []
+    for k, scale in enumerate(reader.rationals("/loop/gain_scale", n + 2)):
+        if scale <= 0:
+            raise DocumentError(f"/loop/gain_scale/{k}", "must be positive")
+        units.append(scale / omega if k == 0 else scale * b0 / omega ** (k + 1))
+    observer = [a / omega**k for k, a in enumerate(Ao)]
+    factor = [d / omega**k for k, d in enumerate(D)]
+    c = observer[1] - (factor[1] if n > 1 else 0)
+    shifted = [*factor, fmpq(0)]
+    known = [shifted[k] + c * shifted[k - 1] - observer[k] for k in range(1, n + 1)]
+    return Controller(observer[1:], factor, known, units)
 
 
 def _continuous(loop: Loop, values: tuple[fmpq, ...]) -> Corner:
-    u, ratio = _command(loop, values), values[3]
-    accelerated = [u[0], u[1] - loop.K, u[2], u[3]]
-    A = fmpq_mat(
-        [[0, 1, 0, 0], accelerated, [u[0], u[1], u[2] - loop.c, u[3]], [ratio, 0, 0, -loop.c]]
+    u, ratio, n = loop.controller.command(values), values[-1], loop.controller.degree
+    companion, drive = loop.step
+    accelerated = [u[0], u[1] - loop.K, *u[2:]]
+    rows = [[fmpq(int(j == 1)) for j in range(loop.size)], accelerated]
+    rows += _filters(companion, drive, u, ratio, loop.size)
+    force = fmpq_mat([[ratio] + [fmpq(0)] * (2 * n + 1)])
+    return Corner(
+        _name(values), fmpq_mat(rows), [force], fmpq_mat([accelerated]), (fmpq(1), fmpq(0))
     )
-    force = fmpq_mat([[ratio, 0, 0, 0]])
-    return Corner(_name(values), A, [force], fmpq_mat([accelerated]), (fmpq(1), fmpq(0)))
 
 
-def _held(loop: Loop, values: tuple[fmpq, ...], a: fmpq, b: fmpq) -> Corner:
-    n, ratio = loop.size, values[3]
-    unit = [[fmpq(int(i == j)) for j in range(n)] for i in range(n)]
-    u = _command(loop, values)
-    v = unit[n - 1] if loop.delay else u
+def _filters(F: fmpq_mat, G: list[fmpq], u: list[fmpq], ratio: fmpq, size: int) -> list[list[fmpq]]:
+    """Rows of both filters: F x̂ + G times what drives them, û and κ ŷ."""
+    n = len(G)
+    force = [ratio] + [fmpq(0)] * (size - 1)
+    rows = []
+    for start, driving in ((2, u), (2 + n, force)):
+        for i in range(n):
+            row = [G[i] * value for value in driving]
+            for j in range(n):
+                row[start + j] += F[i, j]
+            rows.append(row)
+    return rows
+
+
+def _held(loop: Loop, values: tuple[fmpq, ...], a: fmpq) -> Corner:
+    size, ratio = loop.size, values[-1]
+    unit = [[fmpq(int(i == j)) for j in range(size)] for i in range(size)]
+    u = loop.controller.command(values) + [fmpq(0)] * loop.delay
+    v = unit[size - 1] if loop.delay else u
     p = (1 - a) / loop.K if loop.K else loop.period
     q = (loop.period - p) / loop.K if loop.K else loop.period**2 / 2
-    f = (1 - b) / loop.c
 
     def mix(*terms: tuple[fmpq, list[fmpq]]) -> list[fmpq]:
-        return [sum((weight * row[j] for weight, row in terms), fmpq(0)) for j in range(n)]
+        return [sum((weight * row[j] for weight, row in terms), fmpq(0)) for j in range(size)]
 
     one = fmpq(1)
-    rows = [
-        mix((one, unit[0]), (p, unit[1]), (q, v)),
-        mix((a, unit[1]), (p, v)),
-        mix((b, unit[2]), (f, u)),
-        mix((b, unit[3]), (f * ratio, unit[0])),
-    ]
+    rows = [mix((one, unit[0]), (p, unit[1]), (q, v)), mix((a, unit[1]), (p, v))]
+    rows += _filters(*loop.step, u, ratio, size)
     if loop.delay:
-        rows += [u, *unit[4 : n - 1]]
+        rows += [u, *unit[size - loop.delay : size - 1]]
     within = [
         mix((ratio, unit[0])),
         mix((ratio, unit[0]), (ratio * p, unit[1])),
@@ -163,6 +233,35 @@ def _held(loop: Loop, values: tuple[fmpq, ...], a: fmpq, b: fmpq) -> Corner:
     command = fmpq_mat([mix((one, v), (-loop.K, unit[1]))])
     force = [fmpq_mat([row]) for row in within]
     return Corner(_name(values), fmpq_mat(rows), force, command, (p, q))
+
+
+def _filter_step(reader: Reader, omega: fmpq, n: int) -> tuple[fmpq_mat, list[fmpq]]:
+    """The stated step for filter states in time ωt: the k-th is ωᵏ times that in seconds."""
+    F = reader.matrix("/timing/observer_transition", n, n)
+    G = reader.rationals("/timing/observer_input", n)
+    scaled = [
+        [value * omega**i / omega**j for j, value in enumerate(row)] for i, row in enumerate(F)
+    ]
+    return fmpq_mat(scaled), [value * omega ** (i + 1) for i, value in enumerate(G)]
+
+
+def _check_step(
+    step: tuple[fmpq_mat, list[fmpq]], flow: tuple[fmpq_mat, list[fmpq]], period: fmpq
+) -> None:
+    """The stated step is near the exponential of the filters' flow over one period."""
+    n = len(step[1])
+    generator = fmpq_mat(n + 1, n + 1)
+    for i in range(n):
+        for j in range(n):
+            generator[i, j] = period * flow[0][i, j]
+        generator[i, n] = period * flow[1][i]
+    exact = arb_mat(generator).exp()
+    largest = max(exact[i, j].abs_upper() for i in range(n) for j in range(n + 1))
+    for i, row in enumerate(step[0].tolist()):
+        for j, value in enumerate([*row, step[1][i]]):
+            if not abs(exact[i, j] - value) <= STEP_TOLERANCE * largest:
+                place = f"observer_transition/{i}/{j}" if j < n else f"observer_input/{i}"
+                raise DocumentError(f"/timing/{place}", "is not the step of the stated observer")
 
 
 def _enclosure(reader: Reader, pointer: str, x: fmpq) -> tuple[fmpq, ...]:
@@ -186,7 +285,7 @@ def _enclosure(reader: Reader, pointer: str, x: fmpq) -> tuple[fmpq, ...]:
     return tuple(sorted({low, high}))
 
 
-def _energy_input(reader: Reader, K: fmpq, h: fmpq, a: tuple[fmpq, ...], delay: int) -> fmpq_mat:
+def _energy_input(reader: Reader, K: fmpq, h: fmpq, a: tuple[fmpq, ...], others: int) -> fmpq_mat:
     """L with L Lᵀ >= ∫ g gᵀ for the plant's response g = (p(τ), exp(−Kτ)) within a period.
 
     The integral is affine in a = exp(−Kh) and in a², so the ends of both decide.
@@ -203,8 +302,7 @@ def _energy_input(reader: Reader, K: fmpq, h: fmpq, a: tuple[fmpq, ...], delay: 
         excess = L * L.transpose() - fmpq_mat([[double, mixed], [mixed, square]])
         if excess[0, 0] < 0 or excess.det() < 0:
             raise DocumentError(pointer, "does not cover the disturbance of one period")
-    rows = L.tolist() + [[fmpq(0), fmpq(0)]] * (2 + delay)
-    return fmpq_mat(rows)
+    return fmpq_mat(L.tolist() + [[fmpq(0), fmpq(0)]] * others)
 
 
 def _positive(reader: Reader, pointer: str) -> fmpq:
@@ -216,4 +314,4 @@ def _positive(reader: Reader, pointer: str) -> fmpq:
 
 def _name(values: tuple[fmpq, ...]) -> str:
     digits = ", ".join(f"{int(v.p) / int(v.q):.4g}" for v in values)
-    return f"the corner (r1, s0, s1, Ks/b0) = ({digits}), scaled"
+    return f"the corner (r1', s0, …, Ks/b0) = ({digits}), scaled"

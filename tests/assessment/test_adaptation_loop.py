@@ -72,6 +72,21 @@ def test_adaptation_is_one_mode_of_the_controllers_own_derivatives(scenario, des
     )
 
 
+def test_adaptation_is_one_mode_with_an_internal_model_too(resonant):
+    """In continuous time; 60 1/s is apart from the observer's and the model's poles."""
+    scenario = replace(
+        resonant.scenario, adaptation=replace(resonant.scenario.adaptation, bias_force=0.3)
+    )
+    gain = gain_for_speed(resonant.design, scenario.adaptation, speed=60.0, force=1.0)
+    found = linearise_axis(continuous_loop(scenario, resonant.design, gain), force=1.0)
+    nearest = found.adapting[np.argmin(np.abs(found.adapting + 60.0))]
+    assert nearest == pytest.approx(-60.0, rel=1e-6)
+    loop = AdaptationLoop(design=resonant.design, speed=60.0)
+    numerator, denominator = loop.loop_gain
+    poles = np.array([complex(root) for root, _ in (numerator + denominator).complex_roots()])
+    assert np.abs(poles + 60.0).min() < 1e-6
+
+
 def test_normalised_law_has_a_ceiling_and_zero_force_no_adaptation(scenario, design):
     speeds = [
         adaptation_speed(design, scenario.adaptation, gain=1.0, force=force)

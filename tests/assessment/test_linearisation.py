@@ -18,10 +18,12 @@ def loop_of(item, *, velocity_gain=50.0, period=1e-3, delay=1):
     )
 
 
-def test_matrices_agree_to_rounding(continuous, sampled):
+def test_matrices_agree_to_rounding(continuous, sampled, resonant):
     # A dozen products of rounded numbers.
     assert continuous.gap < 1e-14
     assert sampled.gap < 1e-14
+    # The internal model's terms nearly cancel.
+    assert resonant.gap < 1e-13
 
 
 @pytest.mark.parametrize("wrong", [{"velocity_gain": 51.0}, {"period": 1.01e-3}])

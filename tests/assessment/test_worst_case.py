@@ -23,6 +23,11 @@ def item(request, continuous, sampled):
     return {"continuous": continuous, "sampled": sampled}[request.param]
 
 
+@pytest.fixture(scope="module", params=["continuous", "sampled", "resonant"])
+def any_item(request, continuous, sampled, resonant):
+    return {"continuous": continuous, "sampled": sampled, "resonant": resonant}[request.param]
+
+
 def test_no_path_exceeds_a_bound_and_some_come_close(item, record_property):
     cases = worst_cases(item.certificate, paths=16, spans=120, seed=7)
     assert not cases.exceeded
@@ -30,6 +35,14 @@ def test_no_path_exceeds_a_bound_and_some_come_close(item, record_property):
         record_property(comparison.name, comparison.ratio)
         # Hostile means hostile: at this box the bounds are known to be within a factor of 2.5.
         assert 1 <= comparison.ratio < 2.5
+
+
+def test_a_resonant_controller_stays_below_its_bounds(resonant, record_property):
+    cases = worst_cases(resonant.certificate, paths=12, spans=400, seed=7)
+    assert len(cases.comparisons) == 3
+    for comparison in cases.comparisons:
+        record_property(comparison.name, comparison.ratio)
+        assert 1 <= comparison.ratio < 10
 
 
 def test_the_law_itself_stays_below_the_peak_gain(item):
@@ -55,12 +68,18 @@ def test_a_certificate_without_proof_is_refused(item):
         worst_cases(item.certificate, paths=1, spans=4, seed=1)
 
 
-def test_spans_follow_the_differential_equations(item):
+def test_spans_follow_the_differential_equations(any_item):
     """Random gains and disturbance against the oracle, span by span."""
     rng = np.random.default_rng(1)
-    points = _points(item.certificate, rng)
-    spans = _spans(item.certificate, points)
-    axis = Axis(K2=50.0, ao=item.design.specification.observer_pole)
+    points = _points(any_item.certificate, rng)
+    spans = _spans(any_item.certificate, points)
+    specification = any_item.design.specification
+    axis = Axis(
+        K2=50.0,
+        observer=specification.observer,
+        internal_model=specification.internal_model,
+    )
+    own = 2 + 2 * axis.n
     path, d = rng.integers(len(points), size=25), rng.standard_normal((25, SUBSTEPS))
     force, state = [], np.zeros(spans.transition.shape[1])
     for point, pushed in zip(path, d, strict=True):
@@ -68,17 +87,17 @@ def test_spans_follow_the_differential_equations(item):
         state = spans.transition[point] @ state + spans.effect[point] @ pushed
     if spans.sampled:
         expected, _ = axis.sampled_run(
-            points[path, :3], points[path, 3], d, spans.duration, 1, np.zeros(4), SUBSTEPS
+            points[path, :-1], points[path, -1], d, spans.duration, 1, np.zeros(own), SUBSTEPS
         )
     else:
-        expected, x = [], np.zeros(4)
+        expected, x = [], np.zeros(own)
         for point, pushed in zip(points[path], d, strict=True):
             transition, effect = axis.continuous_step(
-                point[:3], point[3], spans.duration / SUBSTEPS
+                point[:-1], point[-1], spans.duration / SUBSTEPS
             )
             for value in pushed:
                 x = transition @ x + effect * value
-                expected.append(point[3] * x[0])
+                expected.append(point[-1] * x[0])
     # Both are exact up to the rounding of a hundred products.
     np.testing.assert_allclose(np.ravel(force), expected, rtol=1e-9, atol=1e-12)
 

@@ -1,7 +1,13 @@
 """The adaptive RST loop of one axis, written out plainly in SI units with NumPy.
 
-Plant y'' = −K2 y' + b0 u − disturbance terms; filters, gradient law and augmented error exactly as
-in Åström and Wittenmark, *Adaptive Control*, section 5.8, with Q = Ao Am, P1 = Am, P2 = Ao.
+    y'' = −K2 y' + b0 (u + push)
+    φ = (D u, pⁿ y … y, −pⁿ uc … −uc)/(Ao Am),   n = deg Ao = deg D + 1
+    R = (p + c) D + r1' D,   so   u = −(((p + c) D − Ao)/Ao) u − θᵀ (Am φ)
+    η = −((p + c) D/(Ao Am) u + φᵀθ),   ε = (y − ym) + b0 η
+
+gradient law as in Åström and Wittenmark, *Adaptive Control*, section 5.8, with Q = Ao Am, P1 = Am,
+P2 = Ao. Every signal goes through one chain of integrators with the characteristic polynomial
+Ao Am, of which all powers up to n + 1 are states.
 """
 
 from __future__ import annotations
@@ -16,41 +22,99 @@ from scipy.integrate import solve_ivp
 
 @dataclass
 class AxisLoop:
-    """States: y, y', xu, zu1, zu2, xy, zy1, zy2, xc, zc1, zc2, ym', ym, θ (5)."""
+    """States: y, y', chains of u, y and uc (n + 2 each, lowest power first), ym, ym', θ.
+
+    A chain holds pⁱ v/(Ao Am) times ω^(n + 2 − i), which makes its entries of the size of v.
+    """
 
     b0: float
     k2: float
     omega: float
     xi: float
-    ao: float
+    observer: tuple[float, ...]
+    """Ao, highest power first, like the next."""
+    internal_model: tuple[float, ...]
+    scaling: np.ndarray
+    """Of φ̂ = b0 · scaling · φ."""
     gamma: np.ndarray
     alpha: float | None
-    """None: plain gradient law; else Γ φ ε / (α + φ̂ᵀφ̂) with φ̂ = b0 D φ."""
+    """None: plain gradient law; else Γ φ ε / (α + φ̂ᵀφ̂)."""
+    push: float = 0.0
+    """Constant disturbance of the command (m/s²)."""
 
-    def scaling(self) -> np.ndarray:
-        w, b0 = self.omega, self.b0
-        return np.array([w, w**2 / b0, w**3 / b0, w**2 / b0, w**3 / b0])
+    @property
+    def n(self) -> int:
+        return len(self.observer) - 1
 
-    def derivative(self, state: np.ndarray, uc: float, d_acc: float) -> np.ndarray:
-        y, dy, xu, zu1, zu2, xy, zy1, zy2, xc, zc1, zc2, dym, ym = state[:13]
-        theta = state[13:]
-        a1, a0 = 2 * self.xi * self.omega, self.omega**2
-        p1_phi = np.array([xu, y - self.ao * xy, xy, -(uc - self.ao * xc), -xc])
-        phi = np.array([zu2, zy1, zy2, -zc1, -zc2])
-        u = -theta @ p1_phi
-        eta = -((zu1 + self.ao * zu2) + phi @ theta)
-        epsilon = (y - ym) + self.b0 * eta
+    @property
+    def gains_at(self) -> int:
+        """Where θ begins in the state."""
+        return 3 * (self.n + 2) + 4
+
+    def _powers(self, chain: np.ndarray, signal: float) -> np.ndarray:
+        """pⁱ v/(Ao Am) for i = 0 … n + 2."""
+        n = self.n
+        product = np.polymul(self.observer, self._model())[::-1]
+        low = chain / self.omega ** np.arange(n + 2, 0, -1.0)
+        return np.append(low, signal - product[:-1] @ low)
+
+    def _model(self) -> list[float]:
+        return [1.0, 2 * self.xi * self.omega, self.omega**2]
+
+    def _through(self, numerator: np.ndarray, powers: np.ndarray) -> float:
+        """numerator(p) v/(Ao Am)."""
+        return float(np.asarray(numerator)[::-1] @ powers[: len(numerator)])
+
+    def _driven(self) -> np.ndarray:
+        """(p + c) D, c such that its two highest coefficients are those of Ao."""
+        second = self.internal_model[1] if self.n > 1 else 0.0
+        return np.polymul([1.0, self.observer[1] - second], self.internal_model)
+
+    def signals(self, state: np.ndarray, uc: float) -> tuple[float, np.ndarray, float]:
+        """(u, φ, ε)."""
+        n, Am = self.n, self._model()
+        y, _, ym, _ = (*state[:2], *state[self.gains_at - 2 : self.gains_at])
+        chains = state[2 : self.gains_at - 2].reshape(3, n + 2)
+        theta = state[self.gains_at :]
+        of_u = self._powers(chains[0], 0.0)  # nothing below reads its highest power
+        of_y, of_uc = self._powers(chains[1], y), self._powers(chains[2], uc)
+        unit = np.eye(n + 1)  # pⁿ … 1
+        phi, coarse = (
+            np.array(
+                [
+                    self._through(np.polymul(self.internal_model, by), of_u),
+                    *(self._through(np.polymul(row, by), of_y) for row in unit),
+                    *(-self._through(np.polymul(row, by), of_uc) for row in unit),
+                ]
+            )
+            for by in ([1.0], Am)
+        )
+        known = np.polysub(self._driven(), self.observer)[2:]  # nothing left above pⁿ⁻²
+        u = -theta @ coarse
+        if n > 1:
+            u -= self._through(np.polymul(known, Am), of_u)
+        eta = -(self._through(self._driven(), of_u) + phi @ theta)
+        return float(u), phi, float(y - ym + self.b0 * eta)
+
+    def derivative(self, state: np.ndarray, uc: float) -> np.ndarray:
+        n = self.n
+        y, dy, ym, dym = (*state[:2], *state[self.gains_at - 2 : self.gains_at])
+        u, phi, epsilon = self.signals(state, uc)
         rate = self.gamma * phi * epsilon
         if self.alpha is not None:
-            scaled = self.b0 * self.scaling() * phi
+            scaled = self.b0 * self.scaling * phi
             rate = rate / (self.alpha + scaled @ scaled)
+        chains = state[2 : self.gains_at - 2].reshape(3, n + 2)
+        moving = [
+            np.append(self.omega * chain[1:], self.omega * self._powers(chain, signal)[-1])
+            for chain, signal in zip(chains, (u, y, uc), strict=True)
+        ]
+        _, damping, stiffness = self._model()
         return np.concatenate(
             [
-                [dy, -self.k2 * dy + self.b0 * u + d_acc],
-                [-self.ao * xu + u, -a1 * zu1 - a0 * zu2 + xu, zu1],
-                [-self.ao * xy + y, -a1 * zy1 - a0 * zy2 + xy, zy1],
-                [-self.ao * xc + uc, -a1 * zc1 - a0 * zc2 + xc, zc1],
-                [-a1 * dym - a0 * ym + a0 * uc, dym],
+                [dy, -self.k2 * dy + self.b0 * (u + self.push)],
+                *moving,
+                [dym, -damping * dym - stiffness * ym + stiffness * uc],
                 rate,
             ]
         )
@@ -64,12 +128,12 @@ class AxisLoop:
         tolerance: float,
     ) -> np.ndarray:
         """States at `times` from rest with gains `theta`; `uc` constant between the times given."""
-        state = np.concatenate([np.zeros(13), theta])
+        state = np.concatenate([np.zeros(self.gains_at), theta])
         rows = [state]
         for start, end in pairwise(times):
             level = uc(0.5 * (start + end))
             solution = solve_ivp(
-                lambda _, x, level=level: self.derivative(x, level, 0.0),
+                lambda _, x, level=level: self.derivative(x, level),
                 (start, end),
                 state,
                 method="DOP853",

@@ -14,7 +14,6 @@ import pytest
 from flint import fmpq
 
 from mrac_design.errors import CertificateError
-from mrac_design.stability.adaptive_loop import relative_box
 from mrac_design.stability.certificate_file import (
     certificate_document,
     certificate_schema,
@@ -22,19 +21,25 @@ from mrac_design.stability.certificate_file import (
     write_certificate,
 )
 from mrac_design.stability.certification import certify
+from mrac_design.stability.parameter_box import relative_box
 from mrac_design.stability.sampled_loop import sampling
 from mrac_design.time_domain import Continuous
 from mrac_design.verify import verify_certificate
+from tests.stability.internal_models import HEART_BAND, INTEGRATOR
 from tests.stability.test_certificate import rst_loop
 
+CASES = {
+    "continuous": (rst_loop(500, 50), "0.3", Continuous()),
+    "sampled": (rst_loop(200, 50), "0.15", sampling("1/1000", 1)),
+    "no velocity loop": (rst_loop(200, 0), "0.1", sampling("1/1000", 0)),
+    "integrator": (INTEGRATOR.loop, ("0.02", "0", "0", "0.02"), sampling("1/1000", 1)),
+    "heart band": (HEART_BAND.loop, ("0.02", "0", "0", "0.02", "0"), sampling("1/1000", 1)),
+}
 
-@pytest.fixture(scope="module", params=["continuous", "sampled", "no velocity loop"])
+
+@pytest.fixture(scope="module", params=CASES)
 def path(request, tmp_path_factory) -> Path:
-    loop, box, timing = {
-        "continuous": (rst_loop(500, 50), "0.3", Continuous()),
-        "sampled": (rst_loop(200, 50), "0.15", sampling("1/1000", 1)),
-        "no velocity loop": (rst_loop(200, 0), "0.1", sampling("1/1000", 0)),
-    }[request.param]
+    loop, box, timing = CASES[request.param]
     target = tmp_path_factory.mktemp("certificate") / "certificate.json"
     write_certificate(certify(loop, relative_box(loop, box, (800, 1000)), timing), target)
     return target
@@ -64,7 +69,8 @@ def replaced(document, trail, value):
 def resealed(document):
     """What a forger would do: new digests for every value, and a new hash of the gains."""
     document = json.loads(json.dumps(document))
-    lines = "".join(f"{k}={v}\n" for k, v in sorted(document["loop"].items()))
+    loop = {k: v if isinstance(v, str) else " ".join(v) for k, v in document["loop"].items()}
+    lines = "".join(f"{k}={v}\n" for k, v in sorted(loop.items()))
     document["gains_hash"] = hashlib.sha256(lines.encode()).hexdigest()
     document.pop("seal")
     pointers = {"".join(f"/{key}" for key in trail): value for trail, value in leaves(document)}
@@ -133,18 +139,36 @@ def test_a_forged_box_or_plant_is_refused(path) -> None:
     forgeries = [
         (("box", "stiffness_ratio", 1), "9"),
         (("box", "upper", 2), "40"),
-        (("loop", "s1"), "1"),
+        (("loop", "gains", 2), "1"),
+        (("loop", "gain_scale", 1), "1"),
+        (("loop", "observer", 0), "2"),
         (("format",), "another format"),
     ]
     if document["timing"]["kind"] == "sampled":
         forgeries += [
             (("timing", "period"), "1/50"),
-            (("timing", "observer_exponential", 0), "1"),
+            (("timing", "observer_transition", 0, 0), "1"),
+            (("timing", "observer_input", 0), "1/500"),
             (("timing", "energy_input", 1, 1), "1/1000000"),
         ]
     for trail, value in forgeries:
         report, _ = checked(resealed(replaced(document, trail, value)), path)
         assert not report.accepted, trail
+
+
+def test_a_box_without_the_nominal_gains_is_refused(path) -> None:
+    document = json.loads(path.read_text())
+    upper = document["box"]["upper"][0]
+    report, _ = checked(resealed(replaced(document, ("box", "lower", 0), upper)), path)
+    assert [f.problem for f in report.findings] == ["the nominal gain is outside the box"]
+
+
+def test_an_older_format_is_refused_in_a_sentence(path) -> None:
+    document = json.loads(path.read_text())
+    older = document["format"].replace("2", "1")
+    report, _ = checked(resealed(replaced(document, ("format",), older)), path)
+    assert [f.pointer for f in report.findings] == ["/format"]
+    assert "make the certificate again" in report.findings[0].problem
 
 
 def test_missing_and_malformed_parts_are_findings(path) -> None:
@@ -196,12 +220,12 @@ def test_the_command_runs_with_python_flint_alone(path) -> None:
 def test_the_command_names_file_and_line(path) -> None:
     document = json.loads(path.read_text())
     target = path.with_name("altered.json")
-    target.write_text(json.dumps(replaced(document, ("loop", "s0"), "7"), indent=1))
+    target.write_text(json.dumps(replaced(document, ("loop", "gains", 1), "7"), indent=1))
     command = [sys.executable, "-m", "mrac_design.verify", str(target)]
     done = subprocess.run(command, capture_output=True, text=True, check=False)
     assert done.returncode == 1
-    line = next(k for k, t in enumerate(target.read_text().splitlines(), 1) if '"s0"' in t)
-    assert f"{target}:{line}: /loop/s0: this value or its seal" in done.stderr
+    line = next(k for k, t in enumerate(target.read_text().splitlines(), 1) if t.strip() == '"7",')
+    assert f"{target}:{line}: /loop/gains/1: this value or its seal" in done.stderr
 
 
 def test_nothing_is_written_without_a_proof(tmp_path) -> None:
@@ -214,8 +238,7 @@ def test_nothing_is_written_without_a_proof(tmp_path) -> None:
 
 def test_the_hash_ties_the_certificate_to_the_gains(path) -> None:
     document = json.loads(path.read_text())
-    loops = (rst_loop(500, 50), rst_loop(200, 50), rst_loop(200, 0))
-    assert sum(document["gains_hash"] == gains_hash(loop) for loop in loops) == 1
+    assert sum(document["gains_hash"] == gains_hash(loop) for loop, _, _ in CASES.values()) == 1
 
 
 def test_the_document_of_a_proof_needs_no_file() -> None:
