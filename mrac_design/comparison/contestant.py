@@ -97,6 +97,9 @@ class Contestant:
     """What it needs and offers."""
     parameters: tuple[TuningParameter, ...]
     """What the tuner chooses, in the order of the tuning vector."""
+    base: int
+    """How many of them, the first ones, make the controller that the others adapt; these are tuned
+    first, with the others where they start."""
     build: Build
     """Makes the controller."""
     proof: Proof | None = None

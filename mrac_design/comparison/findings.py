@@ -20,9 +20,12 @@ PAIRS = (
     ("mrac", "frozen"),
     ("mrac_inverse", "frozen_inverse"),
     ("mrac_bias", "integral"),
+    ("mrac_resonant", "resonant"),
+    ("mrac_harmonic", "resonant"),
 )
 """Adaptive contestants with the fixed ones they are to be measured against: the same reference
-path, and for the bias regressor, which integrates, the fixed controller that integrates too."""
+path and internal model, and for the bias regressor, which integrates, the fixed controller that
+integrates too."""
 
 
 def ranking(comparison: Comparison, condition: str) -> tuple[Contestant, ...]:

@@ -103,6 +103,7 @@ def rival_contestants() -> tuple[Contestant, ...]:
                 TuningParameter(name="learning", unit="", low=0.02, high=1.0, start=0.3),
                 TuningParameter(name="lag", unit="s", low=1e-3, high=0.05, start=0.004),
             ),
+            base=4,
             build=_preview,
         ),
     )
@@ -129,6 +130,7 @@ def _rival(
             proof="fixed gains: poles",
         ),
         parameters=parameters,
+        base=len(parameters),
         build=build,
     )
 

@@ -4,6 +4,8 @@ from __future__ import annotations
 
 from dataclasses import replace
 
+import numpy as np
+
 from mrac_design.arrays import FloatArray
 from mrac_design.comparison.contestant import (
     LEAD,
@@ -17,27 +19,39 @@ from mrac_design.comparison.contestant import (
 )
 from mrac_design.comparison.setting import AxisSetting
 from mrac_design.controller.adaptation import AdaptationLaw, NormalisedGradientLaw
-from mrac_design.controller.adaptive import GAIN_NAMES, AdaptiveRST, build_step, nominal_gains
-from mrac_design.controller.disturbance_observer import with_disturbance_observer
+from mrac_design.controller.adaptive import AdaptiveRST, build_step, nominal_gains
 from mrac_design.controller.oscillator import Oscillator
 from mrac_design.controller.reference import DirectReference, LeadingInverse, ReferenceFeedforward
+from mrac_design.controller.rivals.fixed_rst import FixedRST, fixed_rst
 from mrac_design.controller.rivals.linear import build_linear_step
-from mrac_design.controller.rivals.rst_integral import IntegralRST, integral_rst
 from mrac_design.controller.robust import GainBox, WithProjection
-from mrac_design.design import ReferenceModel, RSTDesign, RSTSpecification, design_rst
+from mrac_design.design import (
+    ReferenceModel,
+    RSTDesign,
+    RSTSpecification,
+    design_rst,
+    first_order_observer,
+)
 
 STIFFEST_FACTOR = 1.5
 """Stiffness, as a factor on the design's, up to which the certified contestant is proved stable."""
 
 BANDWIDTH = TuningParameter(name="$\\omega$", unit="rad/s", low=80.0, high=1500.0, start=400.0)
+DAMPING = TuningParameter(name="$\\xi$", unit="", low=0.5, high=3.0, start=1.2)
 OBSERVER_RATIO = TuningParameter(name="$a_o/\\omega$", unit="", low=0.05, high=5.0, start=0.4)
-GAIN = TuningParameter(name="$\\hat\\gamma$", unit="", low=0.003, high=3.0, start=0.2)
+OBSERVER_BANDWIDTH = TuningParameter(
+    name="$\\omega_o$", unit="rad/s", low=20.0, high=1000.0, start=100.0
+)
+OBSERVER_DAMPING = TuningParameter(name="$\\xi_o$", unit="", low=0.02, high=2.0, start=0.5)
+OBSERVER_POLE = TuningParameter(name="$a_o$", unit="rad/s", low=20.0, high=1000.0, start=100.0)
+RESONANCE = TuningParameter(name="$\\nu$", unit="rad/s", low=5.0, high=100.0, start=30.0)
+GAIN = TuningParameter(name="$\\hat\\gamma$", unit="", low=0.001, high=3.0, start=0.01)
 NORMALISATION = TuningParameter(name="$\\alpha$", unit="N²", low=0.01, high=10.0, start=1.0)
 BIAS = TuningParameter(name="bias regressor", unit="N", low=0.1, high=30.0, start=1.0)
 BOX = TuningParameter(name="box", unit="", low=0.01, high=0.5, start=0.05)
 HARMONIC = TuningParameter(name="harmonic regressors", unit="N", low=0.03, high=30.0, start=1.0)
 TRACKING = TuningParameter(name="frequency tracking", unit="1/s", low=0.01, high=3.0, start=0.1)
-DRIVE = TuningParameter(name="drive", unit="m/s²", low=1e-3, high=20.0, start=0.02)
+_ADAPTATION = (GAIN, NORMALISATION, BIAS, BOX, HARMONIC, TRACKING)
 HARMONICS = 5
 """Harmonics of the beat among the regressors."""
 _BOUNDED = 50.0
@@ -73,57 +87,44 @@ _STILL = NormalisedGradientLaw(gain=0.0, alpha=1.0)
 def rst_contestants() -> tuple[Contestant, ...]:
     """The whole family, from the paper's controller without adaptation upwards."""
     rst = (BANDWIDTH, OBSERVER_RATIO)
-    adaptive = (*rst, GAIN, NORMALISATION)
+    adaptive = (*rst, LEAD, GAIN, NORMALISATION)
+    integral = (BANDWIDTH, DAMPING, OBSERVER_BANDWIDTH, OBSERVER_DAMPING)
+    resonant = (*integral, OBSERVER_POLE, RESONANCE)
+    boxed = (*resonant, LEAD, GAIN, NORMALISATION, BOX)
+    knows_band = replace(_FIXED, motion_model=True)
     return (
         _contestant("frozen", "frozen RST", rst, _frozen),
         _contestant("frozen_inverse", "frozen RST + inverse", (*rst, LEAD), _frozen_inverse),
-        _contestant(
-            "integral",
-            "RST with integrator",
-            (
-                BANDWIDTH,
-                TuningParameter(
-                    name="$\\omega_o$", unit="rad/s", low=20.0, high=1000.0, start=100.0
-                ),
-                TuningParameter(name="$\\xi_o$", unit="", low=0.2, high=2.0, start=0.7),
-                LEAD,
-            ),
-            _integral,
-        ),
-        _contestant("mrac", "MRAC", adaptive, _mrac, _ADAPTING),
-        _contestant("mrac_inverse", "MRAC + inverse", (*adaptive, LEAD), _mrac_inverse, _ADAPTING),
-        _contestant(
-            "mrac_bias", "MRAC + inverse + bias", (*adaptive, BIAS, LEAD), _mrac_bias, _ADAPTING
-        ),
+        _contestant("integral", "RST with integrator", (*integral, LEAD), _integral),
+        _contestant("resonant", "RST with resonance", (*resonant, LEAD), _resonant, knows_band),
+        _contestant("mrac", "MRAC", (*rst, GAIN, NORMALISATION), _mrac, _ADAPTING),
+        _contestant("mrac_inverse", "MRAC + inverse", adaptive, _mrac_inverse, _ADAPTING),
+        _contestant("mrac_bias", "MRAC + inverse + bias", (*adaptive, BIAS), _mrac_bias, _ADAPTING),
         _contestant(
             "mrac_certified",
             "MRAC + inverse + bias, boxed",
-            (*adaptive, BIAS, BOX, LEAD),
+            (*adaptive, BIAS, BOX),
             _mrac_certified,
             _BOXED,
-            box_is_certified,
+            lambda setting, values: box_is_certified(
+                setting, rst_design(setting, values), float(values[6])
+            ),
+        ),
+        _contestant(
+            "mrac_resonant",
+            "MRAC with resonance, boxed",
+            boxed,
+            _mrac_resonant,
+            replace(_BOXED, motion_model=True),
+            _resonant_box_is_certified,
         ),
         _contestant(
             "mrac_harmonic",
-            "MRAC + inverse + harmonics, boxed",
-            (*adaptive, BIAS, BOX, HARMONIC, TRACKING, LEAD),
+            "MRAC with resonance + harmonics, boxed",
+            (*boxed, HARMONIC, TRACKING),
             _mrac_harmonic,
             replace(_BOXED, motion_model=True, periodicity=True),
-            box_is_certified,
-        ),
-        _contestant(
-            "frozen_observer",
-            "frozen RST + inverse + observer",
-            (*rst, DRIVE, LEAD),
-            _frozen_observer,
-            replace(_FIXED, motion_model=True),
-        ),
-        _contestant(
-            "mrac_observer",
-            "MRAC + inverse + observer",
-            (*adaptive, DRIVE, LEAD),
-            _mrac_observer,
-            replace(_ADAPTING, motion_model=True, proof="none yet"),
+            _resonant_box_is_certified,
         ),
     )
 
@@ -142,32 +143,30 @@ def _contestant(
         family=Family.ADAPTIVE if features.adapts else Family.FROZEN,
         features=features,
         parameters=parameters,
+        base=sum(parameter not in _ADAPTATION for parameter in parameters),
         build=build,
         proof=proof,
     )
 
 
-def box_is_certified(setting: AxisSetting, values: FloatArray) -> bool:
+def box_is_certified(setting: AxisSetting, design: RSTDesign, share: float) -> bool:
     """Whether a common Lyapunov function was found and proved, in exact arithmetic, for every
-    path of the gains in the box and every stiffness up to STIFFEST_FACTOR times the design's.
-
-    `values` begin with ω, ao/ω, γ̂, α, bias and the box.
-    """
-    from mrac_design.stability.adaptive_loop import adaptive_loop, relative_box
+    path of the gains within ± `share` of the design's and every stiffness up to STIFFEST_FACTOR
+    times the design's."""
+    from mrac_design.controller.axis_loop import axis_loop
+    from mrac_design.polynomials.rationals import decimal_rational
     from mrac_design.stability.certification import has_common_lyapunov_function
+    from mrac_design.stability.parameter_box import relative_box
     from mrac_design.stability.sampled_loop import sampling
 
-    design = rst_design(setting, values)
-    loop = adaptive_loop(
-        design_stiffness=setting.stiffness,
-        velocity_gain=setting.velocity_gain,
-        bandwidth=design.specification.reference_model.bandwidth,
-        observer_pole=design.specification.observer_pole,
-        gains=tuple(design.parameters[:3]),
-    )
+    timing = sampling(decimal_rational(setting.period), setting.delay)
+    loop = axis_loop(design, [timing.period])
     tissue = (setting.stiffness, STIFFEST_FACTOR * setting.stiffness)
-    box = relative_box(loop, float(values[5]), tissue)
-    return has_common_lyapunov_function(loop, box, sampling(setting.period, setting.delay))
+    return has_common_lyapunov_function(loop, relative_box(loop, share, tissue), timing)
+
+
+def _resonant_box_is_certified(setting: AxisSetting, values: FloatArray) -> bool:
+    return box_is_certified(setting, _resonant_design(setting, values), float(values[9]))
 
 
 def rst_design(setting: AxisSetting, values: FloatArray) -> RSTDesign:
@@ -177,21 +176,49 @@ def rst_design(setting: AxisSetting, values: FloatArray) -> RSTDesign:
         RSTSpecification(
             plant=setting.plant,
             reference_model=ReferenceModel(bandwidth=bandwidth, damping=1.0),
-            observer_pole=ratio * bandwidth,
+            observer=first_order_observer(ratio * bandwidth),
         )
     )
 
 
+def _integral_design(setting: AxisSetting, values: FloatArray) -> RSTDesign:
+    """R = p (p + r1), of a tuning vector that begins with ω, ξ, ωo, ξo."""
+    return design_rst(
+        RSTSpecification(
+            plant=setting.plant,
+            reference_model=_model(values[:2]),
+            observer=tuple(_model(values[2:4]).polynomial.tolist()),
+            internal_model=(1.0, 0.0),
+        )
+    )
+
+
+def _resonant_design(setting: AxisSetting, values: FloatArray) -> RSTDesign:
+    """R = (p² + ν²)(p + r1), of a tuning vector that begins with ω, ξ, ωo, ξo, ao, ν."""
+    Ao = np.polymul(_model(values[2:4]).polynomial, [1.0, float(values[4])])
+    return design_rst(
+        RSTSpecification(
+            plant=setting.plant,
+            reference_model=_model(values[:2]),
+            observer=tuple(Ao.tolist()),
+            internal_model=(1.0, 0.0, float(values[5]) ** 2),
+        )
+    )
+
+
+def _model(values: FloatArray) -> ReferenceModel:
+    return ReferenceModel(bandwidth=float(values[0]), damping=float(values[1]))
+
+
 def _axis(
     setting: AxisSetting,
-    values: FloatArray,
+    design: RSTDesign,
     law: AdaptationLaw,
     *,
     feedforward: ReferenceFeedforward,
     bias: float = 0.0,
     oscillator: Oscillator | None = None,
 ) -> TunedAxis:
-    design = rst_design(setting, values)
     step = build_step(
         AdaptiveRST(
             design=design,
@@ -208,21 +235,29 @@ def _axis(
 
 
 def _frozen(setting: AxisSetting, beat: float, values: FloatArray) -> TunedAxis:
-    return _axis(setting, values, _STILL, feedforward=DirectReference())
+    return _axis(setting, rst_design(setting, values), _STILL, feedforward=DirectReference())
 
 
 def _frozen_inverse(setting: AxisSetting, beat: float, values: FloatArray) -> TunedAxis:
-    return _axis(setting, values, _STILL, feedforward=LeadingInverse(float(values[-1])))
+    return _axis(
+        setting, rst_design(setting, values), _STILL, feedforward=LeadingInverse(float(values[2]))
+    )
 
 
 def _integral(setting: AxisSetting, beat: float, values: FloatArray) -> TunedAxis:
-    controller = integral_rst(
-        IntegralRST(
-            plant=setting.plant,
-            reference_model=ReferenceModel(bandwidth=float(values[0]), damping=1.0),
-            observer=ReferenceModel(bandwidth=float(values[1]), damping=float(values[2])),
+    return _fixed(setting, _integral_design(setting, values), float(values[4]))
+
+
+def _resonant(setting: AxisSetting, beat: float, values: FloatArray) -> TunedAxis:
+    return _fixed(setting, _resonant_design(setting, values), float(values[6]))
+
+
+def _fixed(setting: AxisSetting, design: RSTDesign, lead: float) -> TunedAxis:
+    controller = fixed_rst(
+        FixedRST(
+            design=design,
             prefilter=setting.prefilter,
-            feedforward=LeadingInverse(float(values[-1])),
+            feedforward=LeadingInverse(lead),
             time_domain=setting.domain,
         )
     )
@@ -230,78 +265,59 @@ def _integral(setting: AxisSetting, beat: float, values: FloatArray) -> TunedAxi
 
 
 def _law(values: FloatArray) -> NormalisedGradientLaw:
-    return NormalisedGradientLaw(gain=float(values[2]), alpha=float(values[3]))
+    """The law of γ̂ and α."""
+    return NormalisedGradientLaw(gain=float(values[0]), alpha=float(values[1]))
 
 
-def _boxed(setting: AxisSetting, values: FloatArray, extra: int) -> WithProjection:
-    """The law with its gains in the box, bias and harmonics bounded as well."""
-    centre = nominal_gains(rst_design(setting, values))
-    box = GainBox.around(centre, fraction=float(values[5]))
-    free = (_BOUNDED,) * extra
+def _boxed(
+    design: RSTDesign, law: NormalisedGradientLaw, share: float, *, harmonics: int = 0
+) -> WithProjection:
+    """The law with its gains in the box; bias and harmonics bounded as well."""
+    box = GainBox.around(nominal_gains(design), fraction=share)
+    free = (_BOUNDED,) * (1 + 2 * harmonics)
     return WithProjection(
-        law=_law(values),
+        law=law,
         box=GainBox(lower=(*box.lower, *(-b for b in free)), upper=(*box.upper, *free)),
     )
 
 
 def _mrac(setting: AxisSetting, beat: float, values: FloatArray) -> TunedAxis:
-    return _axis(setting, values, _law(values), feedforward=DirectReference())
+    design = rst_design(setting, values)
+    return _axis(setting, design, _law(values[2:]), feedforward=DirectReference())
 
 
 def _mrac_inverse(setting: AxisSetting, beat: float, values: FloatArray) -> TunedAxis:
-    return _axis(setting, values, _law(values), feedforward=LeadingInverse(float(values[-1])))
+    design, lead = rst_design(setting, values), LeadingInverse(float(values[2]))
+    return _axis(setting, design, _law(values[3:]), feedforward=lead)
 
 
 def _mrac_bias(setting: AxisSetting, beat: float, values: FloatArray) -> TunedAxis:
-    bias = float(values[4])
-    return _axis(
-        setting, values, _law(values), feedforward=LeadingInverse(float(values[-1])), bias=bias
-    )
+    design, lead = rst_design(setting, values), LeadingInverse(float(values[2]))
+    return _axis(setting, design, _law(values[3:]), feedforward=lead, bias=float(values[5]))
 
 
 def _mrac_certified(setting: AxisSetting, beat: float, values: FloatArray) -> TunedAxis:
-    law = _boxed(setting, values, len(GAIN_NAMES) - 5)
-    return _axis(
-        setting, values, law, feedforward=LeadingInverse(float(values[-1])), bias=float(values[4])
-    )
+    design, lead = rst_design(setting, values), LeadingInverse(float(values[2]))
+    law = _boxed(design, _law(values[3:]), float(values[6]))
+    return _axis(setting, design, law, feedforward=lead, bias=float(values[5]))
+
+
+def _mrac_resonant(setting: AxisSetting, beat: float, values: FloatArray) -> TunedAxis:
+    design, lead = _resonant_design(setting, values), LeadingInverse(float(values[6]))
+    law = _boxed(design, _law(values[7:]), float(values[9]))
+    return _axis(setting, design, law, feedforward=lead)
 
 
 def _mrac_harmonic(setting: AxisSetting, beat: float, values: FloatArray) -> TunedAxis:
+    design, lead = _resonant_design(setting, values), LeadingInverse(float(values[6]))
+    law = _boxed(design, _law(values[7:]), float(values[9]), harmonics=HARMONICS)
     oscillator = Oscillator(
         frequency=1.0 / beat,
         lowest=0.7 / beat,
         highest=1.4 / beat,
         harmonics=HARMONICS,
-        force=float(values[6]),
-        tracking=float(values[7]),
+        force=float(values[10]),
+        tracking=float(values[11]),
         floor=0.01,
     )
-    law = _boxed(setting, values, len(GAIN_NAMES) - 5 + 2 * HARMONICS)
-    return _axis(
-        setting,
-        values,
-        law,
-        feedforward=LeadingInverse(float(values[-1])),
-        bias=float(values[4]),
-        oscillator=oscillator,
-    )
-
-
-def _observed(setting: AxisSetting, axis: TunedAxis, drive: float) -> TunedAxis:
-    step = with_disturbance_observer(
-        axis.step,
-        plant=setting.plant,
-        domain=setting.domain,
-        delay=setting.delay,
-        drive=drive,
-        force_noise=setting.sensor_noise,
-    )
-    return replace(axis, step=step)
-
-
-def _frozen_observer(setting: AxisSetting, beat: float, values: FloatArray) -> TunedAxis:
-    return _observed(setting, _frozen_inverse(setting, beat, values), float(values[2]))
-
-
-def _mrac_observer(setting: AxisSetting, beat: float, values: FloatArray) -> TunedAxis:
-    return _observed(setting, _mrac_inverse(setting, beat, values), float(values[4]))
+    return _axis(setting, design, law, feedforward=lead, oscillator=oscillator)

@@ -1,5 +1,8 @@
 """One tuner for all: the same search, the same number of evaluations, the same objective.
 
+Adaptive laws are tuned in two stages, the controller they adapt first, since a search in all
+directions at once would spend the budget before it has a loop worth adapting.
+
 Minimised is the rms force error over the training motion. A tuning is admissible when, with
 `extra_delay` samples more dead time than it was designed for, that error grows by no more than
 `allowed_growth`: simulated, so the rule is the same for linear and adaptive laws. Beyond it ten
@@ -22,6 +25,8 @@ from mrac_design.errors import MracDesignError, ParameterError
 
 GLOBAL_SHARE = 0.55
 """Share of the budget that goes to the global search; a simplex refines the best with the rest."""
+BASE_SHARE = 0.75
+"""Share after which the parameters beyond a contestant's base move as well."""
 POPULATION = 12
 """Members of the global search, whatever the number of parameters."""
 FEWEST = 4
@@ -73,8 +78,11 @@ def tune(
     search = _Search(contestant, bench, training, budget, progress)
     try:
         _global_search(search, round(GLOBAL_SHARE * budget), seed)
+        size = len(contestant.parameters)
+        if contestant.base < size:
+            _simplex(search, contestant.base, round(BASE_SHARE * budget))
         while True:  # a simplex that has contracted starts anew from the best
-            _simplex(search)
+            _simplex(search, size, budget)
     except _BudgetSpent:
         return search.best
 
@@ -83,12 +91,13 @@ def _global_search(search: _Search, count: int, seed: int) -> None:
     from scipy.optimize import differential_evolution
     from scipy.stats import qmc
 
-    size = len(search.contestant.parameters)
+    start = search.contestant.position(search.contestant.start)
+    size = search.contestant.base
     members = max(5, min(POPULATION, count // 2))
     first = qmc.Sobol(size, seed=seed).random(1 << math.ceil(math.log2(members)))[:members]
-    first[0] = search.contestant.position(search.contestant.start)
+    first[0] = start[:size]
     differential_evolution(
-        search,
+        lambda position: search(np.append(position, start[size:])),
         [(0.0, 1.0)] * size,
         init=first,
         maxiter=max(0, count // members - 1),
@@ -98,19 +107,26 @@ def _global_search(search: _Search, count: int, seed: int) -> None:
     )
 
 
-def _simplex(search: _Search) -> None:
+def _simplex(search: _Search, size: int, until: int) -> None:
+    """A simplex in the first `size` parameters about the best so far, up to `until` evaluations."""
     from scipy.optimize import minimize
 
-    centre = search.contestant.position(search.best.values)
+    best = search.contestant.position(search.best.values)
+    centre = best[:size]
     corners = np.vstack([centre, centre + _STEP * np.eye(centre.size)])
     # A corner beyond the border goes to the other side.
     corners = np.where(corners > 1.0, corners - 2.0 * _STEP, corners)
     minimize(
-        search,
+        lambda position: search(np.append(position, best[size:])),
         centre,
         method="Nelder-Mead",
         bounds=[(0.0, 1.0)] * centre.size,
-        options={"initial_simplex": corners, "xatol": 1e-3, "fatol": 1e-6},
+        options={
+            "initial_simplex": corners,
+            "xatol": 1e-3,
+            "fatol": 1e-6,
+            "maxfev": max(1, until - search.used),
+        },
     )
 
 

@@ -8,8 +8,8 @@ import pytest
 from mrac_design.comparison.bench import Bench, Sensing, root_mean_square
 from mrac_design.comparison.comparison import contestants
 from mrac_design.comparison.judging import LOST, Measured, judge
-from mrac_design.comparison.rst_contestants import box_is_certified
-from mrac_design.comparison.tuning import tune
+from mrac_design.comparison.rst_contestants import box_is_certified, rst_design
+from mrac_design.comparison.tuning import BASE_SHARE, tune
 from mrac_design.errors import ParameterError
 
 ALL = {contestant.name: contestant for contestant in contestants()}
@@ -56,9 +56,28 @@ def test_without_its_proof_a_tuning_is_not_admissible(bench, short):
 
 def test_a_small_box_is_certified_and_a_large_one_is_not(setting):
     pytest.importorskip("cvxpy")
-    small = [250.0, 1.0, 0.1, 1.0, 1.0, 0.1]
-    assert box_is_certified(setting, np.array(small))
-    assert not box_is_certified(setting, np.array([*small[:5], 0.5]))
+    design = rst_design(setting, np.array([250.0, 1.0]))
+    assert box_is_certified(setting, design, 0.1)
+    assert not box_is_certified(setting, design, 0.5)
+
+
+def test_a_law_that_adapts_is_tuned_after_the_controller_it_adapts(bench, short):
+    """The first stage leaves the adaptation where it starts; only the last may move it."""
+    contestant = ALL["mrac_resonant"]
+    tried = []
+
+    def recorded(setting, beat, values):
+        tried.append(values)
+        return contestant.build(setting, beat, values)
+
+    budget = 48
+    tune(replace(contestant, build=recorded, proof=None), bench, short, budget=budget, seed=0)
+    moved = [
+        not np.allclose(values[contestant.base :], contestant.start[contestant.base :])
+        for values in tried
+    ]
+    assert not any(moved[: round(BASE_SHARE * budget)])
+    assert any(moved)
 
 
 def test_a_budget_of_nothing_is_refused(bench, short):
@@ -68,7 +87,9 @@ def test_a_budget_of_nothing_is_refused(bench, short):
 
 def test_an_unstable_loop_is_lost_not_an_error(bench, conditions):
     contestant = ALL["frozen_inverse"]
-    judgement = judge(contestant, np.array([1500.0, 5.0]), bench, conditions.judged[:1], seeds=2)
+    judgement = judge(
+        contestant, np.array([1500.0, 5.0, 1e-3]), bench, conditions.judged[:1], seeds=2
+    )
     measured = judgement.conditions["held_back"]
     assert measured.lost
     assert measured.worst > LOST
