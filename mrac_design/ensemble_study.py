@@ -352,7 +352,7 @@ def _gain_places(loop: ForceLoop) -> tuple[int, ...]:
 
 def _step(scenario: Scenario) -> float:
     design = scenario.design
-    return min(_LARGEST_STEP, 0.25 / max(design.bandwidth, design.observer_pole))
+    return min(_LARGEST_STEP, 0.25 / max(design.bandwidth, *map(abs, np.roots(design.observer))))
 
 
 def _step_effect(ensemble: Ensemble, result: EnsembleResult) -> float:

@@ -33,6 +33,7 @@ from IPython.display import Markdown, display
 
 from mrac_design.design import design_rst_exact, diophantine_system
 from mrac_design.plant import ForcePlant
+from mrac_design.polynomials.rationals import coefficients, polynomial_latex
 from mrac_design.report import (
     Table,
     loop_figure,
@@ -56,7 +57,6 @@ scenario = load_scenario(os.environ.get("MRAC_SCENARIO", "nominal"))
 design = scenario_design(scenario)
 specification = design.specification
 plant, model = specification.plant, specification.reference_model
-ao = specification.observer_pole
 plant
 
 # %% [markdown]
@@ -68,19 +68,27 @@ model
 # %% [markdown]
 # ## The Diophantine equation
 #
-# The controller $R\,u = -S\,y + T\,u_c$ with $R = p + r_1$, $S = s_0 p + s_1$, $T = t_0 p + t_1$
-# [Z 7–9] makes the loop behave like the model $A_m$, seen through an observer polynomial
-# $A_o = p + a_o$, when
+# The controller $R\,u = -S\,y + T\,u_c$ with $R = (p + r_1) D$, $S = s_0 p^n + \dots + s_n$,
+# $T = t_0 p^n + \dots + t_n$ makes the loop behave like the model $A_m$, seen through an observer
+# polynomial $A_o$ of degree $n$, when
 #
 # $$A R + b_0 S = A_o A_m, \qquad T = \frac{\omega^2}{b_0} A_o , \qquad b_0 = K_s ,$$
 #
-# with $A = p(p + K_2)$. Compared power by power this is a linear system for $r_1, s_0, s_1$ with
-# one solution,
+# with $A = p(p + K_2)$. $D$, of degree $n - 1$, is an internal model of the heart's motion
+# [AW section 3.2]; the paper's controller [Z 7–9] has none: $D = 1$, $A_o = p + a_o$. Compared
+# power by power this is a linear system for $r_1, s_0, \dots, s_n$ with one solution, in the
+# paper's case
 #
 # $$r_1 = 2\xi\omega + a_o - K_2,\quad s_0 = \frac{2\xi\omega a_o + \omega^2 - K_2 r_1}{b_0},\quad
 #   s_1 = t_1 = \frac{a_o\omega^2}{b_0},\quad t_0 = \frac{\omega^2}{b_0}.$$
 #
 # The program solves the system numerically and again over the rationals, and checks both.
+
+# %%
+Markdown(
+    f"Here $A_o = {polynomial_latex(specification.observer, 'p')}$ and "
+    f"$D = {polynomial_latex(specification.internal_model, 'p')}$."
+)
 
 # %%
 design
@@ -89,20 +97,22 @@ design
 system = diophantine_system(specification)
 exact = design_rst_exact(specification)
 K2, b0, omega, xi = plant.velocity_gain, plant.b0, model.bandwidth, model.damping
-r1 = 2 * xi * omega + ao - K2
-closed_form = {
-    "r1": r1,
-    "s0": (2 * xi * omega * ao + omega**2 - K2 * r1) / b0,
-    "s1": ao * omega**2 / b0,
-    "t0": omega**2 / b0,
-    "t1": ao * omega**2 / b0,
-}
+if specification.degree == 1:
+    ao = specification.observer_pole
+    r1 = 2 * xi * omega + ao - K2
+    s0 = (2 * xi * omega * ao + omega**2 - K2 * r1) / b0
+    expected, name = [r1, s0, ao * omega**2 / b0, omega**2 / b0, ao * omega**2 / b0], "closed form"
+else:
+    r1 = float(exact.R[specification.degree - 1]) - specification.internal_model[1]
+    expected, name = [r1, *coefficients(exact.S), *coefficients(exact.T)], "rational solution"
 deviation = max(
-    abs(getattr(design, name) - value) / unit
-    for (name, value), unit in zip(closed_form.items(), design.scaling, strict=True)
+    abs(value - other) / unit
+    for (_, value, _), other, unit in zip(
+        design.coefficients, expected, design.scaling, strict=True
+    )
 )
 Markdown(
-    f"Largest deviation from the closed form, in the units of $D$ below: {deviation:.1e}. The "
+    f"Largest deviation from the {name}, in the units of $\\Sigma$ below: {deviation:.1e}. The "
     f"relative residual of the Diophantine equation is {design.residual:.1e}; over the rationals "
     f"it is exactly {exact.remainder}."
 )
@@ -146,7 +156,8 @@ def force_per_motion(true_stiffness, frequency):
 beat = 2 * np.pi * 1.0
 stiffnesses = np.array([0.5, 1.0, 1.5]) * plant.stiffness
 responses = np.array([force_per_motion(Ks, beat) for Ks in stiffnesses])
-approximation = abs(1j * beat * K2 * design.r1 - beat**2 * (K2 + design.r1)) / design.s1
+slow = 1j * beat * K2 * design.r1 - beat**2 * (K2 + design.r1)
+approximation = abs(slow * np.polyval(specification.internal_model, 1j * beat)) / design.S[-1]
 Table(
     caption="Force error for heart motion at 1 Hz with frozen gains, derived.",
     header=("true stiffness (N/m)", "force error per motion (mN/mm)"),
@@ -160,19 +171,21 @@ Table(
 # %% [markdown]
 # ## Adaptation
 #
-# The gains $\theta = (r_1 - a_o,\ s_0,\ s_1,\ t_0,\ t_1)$ move with the augmented error
+# The gains $\theta = (r_1 - c,\ s_0, \dots, s_n,\ t_0, \dots, t_n)$ move with the augmented error
 # $\varepsilon$,
 #
-# $$u = -\theta^{\mathsf T}(P_1\varphi),\qquad
+# $$u = -\tfrac{K}{A_o}u - \theta^{\mathsf T}(P_1\varphi),\qquad
 #   \varepsilon = e + b_0\eta,\quad e = y - y_m,\quad
-#   \eta = -\left(\tfrac{1}{P_1}u + \varphi^{\mathsf T}\theta\right),$$
+#   \eta = -\left(\tfrac{(p + c)D}{P_1A_o}u + \varphi^{\mathsf T}\theta\right),$$
 #
-# with $Q = A_oA_m$, $P_1 = A_m$, $P_2 = A_o$ and $\varphi$ made of filtered $u$, $y$ and $u_c$ [AW
-# 5.71, Example 5.14]. ([Z] calls its rule the MIT rule; it is [AW 5.62].) In natural units the
-# gains differ by orders of magnitude and one scalar adaptation gain cannot serve them all.
-# Scaled by $\theta = D\hat\theta$,
-# $D = \mathrm{diag}(\omega,\ \omega^2/b_0,\ \omega^3/b_0,\ \omega^2/b_0,\ \omega^3/b_0)$, and
-# $\hat\varphi = b_0 D\varphi$, they are of order one.
+# with $Q = A_oA_m$, $P_1 = A_m$, $P_2 = A_o$ and $\varphi$ made of filtered $u$, $y$ and $u_c$. $c$
+# makes the two highest powers of $(p + c)D$ those of $A_o$, and $K = (p + c)D - A_o$. Without
+# internal model $c = a_o$, $K = 0$ and this is [AW 5.71, Example 5.14]. ([Z] calls its rule the MIT
+# rule; it is [AW 5.62].) In natural units the gains differ by orders of magnitude and one scalar
+# adaptation gain cannot serve them all. Scaled by $\theta = \Sigma\hat\theta$ with a diagonal
+# $\Sigma$, in the paper's case
+# $\mathrm{diag}(\omega,\ \omega^2/b_0,\ \omega^3/b_0,\ \omega^2/b_0,\ \omega^3/b_0)$, and
+# $\hat\varphi = b_0 \Sigma\varphi$, they are of order one.
 
 # %%
 adaptation = scenario.adaptation
@@ -190,18 +203,23 @@ display(
 )
 Table(
     caption="Nominal gains, the start of the adaptation.",
-    header=("gain", "natural units", r"scaled $\hat\theta$"),
+    header=("gain", "natural units", r"$\Sigma$", r"scaled $\hat\theta$"),
     rows=tuple(
-        (name, f"{natural:.6g} {unit}", f"{scaled:.4g}")
-        for name, unit, natural, scaled in zip(
-            ("$r_1 - a_o$", "$s_0$", "$s_1$", "$t_0$", "$t_1$"),
-            ("1/s", "m/(N·s²)", "m/(N·s³)", "m/(N·s²)", "m/(N·s³)"),
+        (
+            "$r_1 - c$" if name == "r1" else f"${name[0]}_{{{name[1:]}}}$",
+            f"{natural:.6g} {unit}",
+            f"{size:.4g}",
+            f"{scaled:.4g}",
+        )
+        for (name, _, unit), natural, size, scaled in zip(
+            design.coefficients,
             design.parameters,
+            design.scaling,
             design.scaled_parameters,
             strict=True,
         )
     ),
-    numeric=(1, 2),
+    numeric=(1, 2, 3),
 )
 
 # %% [markdown]
@@ -209,9 +227,9 @@ Table(
 #
 # [Z] states that the loop is asymptotically stable and refers to a theorem of [AW]. **That does not
 # follow.** Theorem 5.9 of [AW] adapts one *feedforward* gain in front of a *stable* $G = G_1G_2$
-# whose part $G_1$ is strictly positive real. Here five gains adapt, three of them in the
-# *feedback* path, around a plant that integrates, under a disturbance that the theorem does not
-# have. Hypothesis by hypothesis, decided in exact arithmetic where it can be:
+# whose part $G_1$ is strictly positive real. Here all gains adapt, in the paper's case five, of
+# which three are in the *feedback* path, around a plant that integrates, under a disturbance that
+# the theorem does not have. Hypothesis by hypothesis, decided in exact arithmetic where it can be:
 
 # %%
 c = 0.8 * K2 if K2 > 0 else 0.1 * omega
@@ -290,7 +308,8 @@ assert design.residual <= 1e-12
 assert exact.remainder == 0
 assert np.all(design.closed_loop_poles.real < 0)
 # The formula leaves out terms of the order of frequency over bandwidth, and all that Ks changes.
-assert np.allclose(responses, approximation, rtol=3 * beat * (1 / ao + 2 * xi / omega))
+late = specification.observer[-2] / specification.observer[-1] + 2 * xi / omega
+assert np.allclose(responses, approximation, rtol=3 * beat * late)
 assert theorem.verdict is Verdict.REFUTED
 assert not any(row.usable for row in table.rows if row.second is not None)
 strict = [row.strict.verdict is Verdict.PROVED for row in table.rows]

@@ -87,6 +87,7 @@ study = run_study(scenario)
 axes = study.robot.force_axes
 plant, model = study.plant, study.design.specification.reference_model
 K2, omega, xi = plant.velocity_gain, model.bandwidth, model.damping
+degree = study.design.specification.degree
 published = continuous_design(without_projection(scenario), choices)
 practical = sampled_design(without_projection(scenario), choices)
 designs = (published, practical)
@@ -106,8 +107,8 @@ lines = [
         else "Theorem 5.9 of [AW] covers this loop: "
     )
     + "the theorem adapts one feedforward gain of a stable plant without disturbance, the loop "
-    "adapts five gains, three of them in the feedback path, around a plant that integrates, on a "
-    "heart that moves.",
+    f"adapts {2 * degree + 3} gains, {degree + 2} of them in the feedback path, around a plant "
+    "that integrates, on a heart that moves.",
     "",
     "What is proved instead: when the feedback gains are kept in a box by projection, the loop is "
     "exponentially stable for *every* path of the gains inside it and of the tissue's stiffness "
@@ -510,7 +511,8 @@ for item in designs:
         + ("**within it**." if a.chosen <= a.largest_gain else "**beyond it**.")
     )
     if a.box is not None:
-        ends = zip(("r_1'", "s_0", "s_1"), a.box.lower, a.box.upper, strict=True)
+        names = item.design.specification.gain_names[: len(a.box.lower)]
+        ends = zip((f"{n[0]}_{n[1:]}" for n in names), a.box.lower, a.box.upper, strict=True)
         text += " Project the scaled gains to " + ", ".join(
             f"${name} \\in [{low:.4g}, {high:.4g}]$" for name, low, high in ends
         )

@@ -14,7 +14,7 @@ from mrac_design.controller.linearisation import (
 from mrac_design.controller.reference import ModelInverse
 from mrac_design.controller.robot_step import RobotStep, build_robot_step
 from mrac_design.controller.step import ControllerStep
-from mrac_design.design import ReferenceModel, RSTSpecification, design_rst
+from mrac_design.design import ReferenceModel, RSTSpecification, design_rst, first_order_observer
 from mrac_design.plant import ForcePlant
 from mrac_design.robot import RobotDynamics, build_dynamics, load_robot
 from mrac_design.time_domain import Discrete, TimeDomain
@@ -35,7 +35,7 @@ def controller_of(domain: TimeDomain, *, bandwidth: float = 300.0) -> Controller
         RSTSpecification(
             plant=ForcePlant(stiffness=STIFFNESS, velocity_gain=VELOCITY_GAIN),
             reference_model=ReferenceModel(bandwidth=bandwidth, damping=1.0),
-            observer_pole=bandwidth,
+            observer=first_order_observer(bandwidth),
         )
     )
     return build_step(

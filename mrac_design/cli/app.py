@@ -120,8 +120,8 @@ def design(options: DesignOptions, as_json: JsonOption = False) -> None:
         )
         return
     table = Table("gain", "value", title=chosen.title)
-    for name in ("r1", "s0", "s1", "t0", "t1"):
-        table.add_row(name, f"{getattr(result, name):.6g}")
+    for name, value, _ in result.coefficients:
+        table.add_row(name, f"{value:.6g}")
     OUTPUT.print(table)
     OUTPUT.print("closed-loop poles: " + ", ".join(f"{a:.4g}{b:+.4g}j" for a, b in poles))
     for name in margins.__slots__:

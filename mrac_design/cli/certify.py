@@ -59,7 +59,8 @@ def certify(
     write_certificate(certificate, out)
     typer.echo(f"proved, gains within ±{100 * float(fraction):g} %: {certificate.reason}")
     typer.echo(f"decay rate {certificate.decay_rate:.4g} 1/s")
-    typer.echo(f"peak gain, heart acceleration to force: {certificate.peak_gain:.4g} N/(m/s²)")
+    peak = "not found" if certificate.peak is None else f"{certificate.peak_gain:.4g} N/(m/s²)"
+    typer.echo(f"peak gain, heart acceleration to force: {peak}")
     typer.echo(f"certificate: {out}")
 
 

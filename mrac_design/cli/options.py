@@ -49,8 +49,9 @@ class DesignOptions:
             velocity_gain=self.k2,
             bandwidth=self.omega,
             damping=self.xi,
-            observer_pole=self.ao,
         )
+        if self.ao is not None:
+            design = design.with_observer_pole(self.ao)
         return replace(base, design=design)
 
 

@@ -31,6 +31,9 @@ from mrac_design.time_domain import TimeDomain
 _NEIGHBOURS = 3
 """How many floats to either side rounding can have led astray."""
 
+_FACTOR_TOLERANCE = 1e-12
+"""Of the terms of R's coefficients: each is the rounded sum of two products."""
+
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class LoopPieces:
@@ -42,6 +45,8 @@ class LoopPieces:
     """ω²/Am, u_c to the wanted force."""
     observer: control.TransferFunction
     """1/Ao, the poles the reference does not excite."""
+    internal_model: control.TransferFunction
+    """1/D, of what R is made beside p + r1; 1 without internal model."""
     prefilter: control.TransferFunction | None
     """From the force reference to the desired force; none: a wire."""
     feedback: control.TransferFunction
@@ -56,7 +61,8 @@ def loop_pieces(gains: GainSet) -> LoopPieces:
     return LoopPieces(
         plant=specification.plant.transfer_function(),
         reference_model=specification.reference_model.transfer_function(),
-        observer=control.TransferFunction([1.0], [1.0, specification.observer_pole]),
+        observer=control.TransferFunction([1.0], specification.observer),
+        internal_model=control.TransferFunction([1.0], specification.internal_model),
         prefilter=None if gains.prefilter is None else gains.prefilter.transfer_function(),
         feedback=control.TransferFunction(design.S, design.R),
         feedforward=control.TransferFunction(design.T, design.R),
@@ -69,42 +75,59 @@ def redesigned(gains: GainSet, pieces: LoopPieces) -> GainSet:
     The adapted gains start from the new design's own if they started from the old one's. With
     `loop_pieces(gains)` unchanged it gives `gains` again, exactly for ω and ξ of up to 15
     digits: a polynomial holds only ω² and 2ξω, rounded. Raises ParameterError
-    for pieces of other shapes and for S/R and T/R that do not place the poles.
+    for pieces of other shapes, for S/R and T/R that do not place the poles, and for an observer
+    of another degree when the gains start from numbers of their own.
     """
     model = _model(pieces.reference_model)
-    R, S = _ratio("S/R", pieces.feedback)
-    also_R, T = _ratio("T/R", pieces.feedforward)
+    Ao = _reciprocal("observer", pieces.observer)
+    D = _reciprocal("internal model", pieces.internal_model)
+    R, S = _ratio("S/R", pieces.feedback, len(Ao))
+    also_R, T = _ratio("T/R", pieces.feedforward, len(Ao))
     if not np.array_equal(R, also_R):
         raise ParameterError("R", (R.tolist(), also_R.tolist()), "must be the same in S/R and T/R")
-    one, Ao = pieces.observer.num[0][0], pieces.observer.den[0][0]
-    if len(one) != 1 or len(Ao) != 2 or one[0] != 1.0 or Ao[0] != 1.0:
-        raise ParameterError("observer", pieces.observer, "must be 1/(p + ao)")
+    specification = RSTSpecification(
+        plant=ForcePlant.from_transfer_function(pieces.plant),
+        reference_model=model,
+        observer=Ao,
+        internal_model=D,
+    )
+    own = gains.initial_gains == tuple(gains.design.scaled_parameters.tolist())
     changed = replace(
         gains,
-        specification=RSTSpecification(
-            plant=ForcePlant.from_transfer_function(pieces.plant),
-            reference_model=model,
-            observer_pole=float(Ao[1]),
-        ),
-        coefficients=tuple(float(value) for value in (R[1], *S, *T)),
+        specification=specification,
+        coefficients=(_own_pole(R, np.array(D)), *S.tolist(), *T.tolist()),
+        initial_gains=(0.0,) * len(specification.gain_names) if own else gains.initial_gains,
         prefilter=None if pieces.prefilter is None else _model(pieces.prefilter),
     )
-    if gains.initial_gains != tuple(gains.design.scaled_parameters.tolist()):
+    if not own:
         return changed
     return replace(changed, initial_gains=tuple(changed.design.scaled_parameters.tolist()))
 
 
+def _own_pole(R: FloatArray, D: FloatArray) -> float:
+    """r1 of R = (p + r1) D; raises ParameterError when D is no factor of R."""
+    r1 = float(R[1] - np.append(D, 0.0)[1])
+    terms = np.convolve([1.0, abs(r1)], np.abs(D))
+    if np.any(np.abs(np.convolve([1.0, r1], D) - R) > _FACTOR_TOLERANCE * terms):
+        raise ParameterError("R", R.tolist(), f"must have the internal model {D.tolist()} in it")
+    return r1
+
+
 def frozen_state_space(gains: GainSet) -> control.StateSpace:
-    """The frozen controller, inputs (u_c, y) in N, output u in m/s²; one state."""
-    r1, s0, s1, t0, t1 = gains.coefficients
+    """The frozen controller in observer form, inputs (u_c, y) in N, output u in m/s²; as many
+    states as Ao has roots."""
+    R, S, T = gains.design.R, gains.design.S, gains.design.T
+    n = len(R) - 1
+    A = np.eye(n, k=1)
+    A[:, 0] = -R[1:]
     return control.StateSpace(
-        [[-r1]],
-        [[t1 - r1 * t0, -(s1 - r1 * s0)]],
-        [[1.0]],
-        [[t0, -s0]],
+        A,
+        np.column_stack([T[1:] - R[1:] * T[0], R[1:] * S[0] - S[1:]]),
+        np.eye(1, n),
+        [[T[0], -S[0]]],
         inputs=["command_input", "force"],
         outputs=["command"],
-        states=["rst"],
+        states=[f"rst{i}" for i in range(n)],
         name="frozen_rst",
     )
 
@@ -150,12 +173,25 @@ def _compiled(step: ControllerStep) -> tuple[ca.Function, ca.Function]:
     return ca.Function("update", arguments, [following]), step.command
 
 
-def _ratio(name: str, system: control.TransferFunction) -> tuple[FloatArray, FloatArray]:
-    """Denominator and numerator of (a p + b)/(p + r1), as they are."""
+def _ratio(name: str, system: control.TransferFunction, size: int) -> tuple[FloatArray, FloatArray]:
+    """Denominator and numerator of `size` coefficients each, as they are."""
     numerator, denominator = system.num[0][0], system.den[0][0]
-    if system.dt != 0 or len(numerator) != 2 or len(denominator) != 2 or denominator[0] != 1.0:
-        raise ParameterError(name, system, "must be a continuous (a p + b)/(p + r1)")
+    if system.dt != 0 or not len(numerator) == len(denominator) == size or denominator[0] != 1.0:
+        raise ParameterError(
+            name,
+            system,
+            f"must be continuous, numerator and monic denominator of the observer's degree "
+            f"{size - 1}",
+        )
     return denominator, numerator
+
+
+def _reciprocal(name: str, system: control.TransferFunction) -> tuple[float, ...]:
+    """Monic denominator of a transfer function whose numerator is 1."""
+    numerator, denominator = system.num[0][0], system.den[0][0]
+    if system.dt not in (0, None) or len(numerator) != 1 or numerator[0] != 1.0:
+        raise ParameterError(name, system, "must be 1 over a monic polynomial, continuous")
+    return tuple(denominator.tolist())
 
 
 def _model(system: control.TransferFunction) -> ReferenceModel:

@@ -33,7 +33,7 @@ _BASE_UNITS: Mapping[str, Mapping[str, int]] = {
 _BLOCK_UNITS: Mapping[str, str] = {
     "velocity_gain": "1/s",
     "bandwidth": "rad/s",
-    "ao": "rad/s",
+    "adapted_pole": "1/s",
     "b0": "N/m",
     "prefilter_bandwidth": "rad/s",
     "normalisation": "N2",

@@ -19,8 +19,11 @@ from mrac_design.controller.robust import (
 )
 from mrac_design.design import (
     AugmentedError,
+    ClosedForm,
+    RSTSpecification,
     design_rst_exact,
     diophantine_system,
+    integral_rst_closed_form,
     rst_closed_form,
     unfiltered_error_model,
 )
@@ -28,6 +31,7 @@ from mrac_design.errors import ParameterError, RenderingError
 from mrac_design.export.gain_document import document_of
 from mrac_design.export.gain_set import GainSet
 from mrac_design.export.writing import written_whole
+from mrac_design.polynomials.rationals import polynomial_latex
 from mrac_design.robot import RobotDescription
 from mrac_design.robot.formulas import describe
 
@@ -36,6 +40,16 @@ $$\begin{aligned}
 f^* &= u - K_2 \dot X \\
 \ddot q^* &= J^{-1} (f^* - \dot J \dot q) \\
 \Gamma &= \hat M(q)\,\ddot q^* + \hat V(q, \dot q) + \hat G(q) + J^T F_e
+\end{aligned}$$
+"""
+
+_INTERNAL_MODEL_ERROR = r"""
+$$\begin{aligned}
+u &= -\tfrac{K}{A_o} u - \theta^T (P_1 \varphi) \\
+P_1 \varphi
+  &= \tfrac{1}{A_o} (D u,\; p^DEGREE y,\; \ldots,\; y,\; -p^DEGREE u_c,\; \ldots,\; -u_c)^T \\
+\eta &= -\left(\tfrac{(p + c) D}{P_1 A_o} u + \varphi^T \theta\right) \\
+\varepsilon &= (y - y_m) + b_0 \eta
 \end{aligned}$$
 """
 
@@ -105,19 +119,28 @@ def _loop(gains: GainSet) -> tuple[str, ...]:
 
 def _diophantine(gains: GainSet) -> tuple[str, ...]:
     specification = gains.specification
+    closed = _closed_form(specification)
     return (
         "# Diophantine equation",
-        "$$A R + b_0 S = A_o A_m, \\qquad T = \\tfrac{\\omega^2}{b_0} A_o, \\qquad "
-        f"A_o = p + {specification.observer_pole:.10g}$$",
+        "$$A R + b_0 S = A_o A_m, \\qquad R = (p + r_1) D, \\qquad "
+        "T = \\tfrac{\\omega^2}{b_0} A_o$$",
+        f"$$A_o = {polynomial_latex(specification.observer, 'p')}, \\qquad "
+        f"D = {polynomial_latex(specification.internal_model, 'p')}, \\qquad "
+        f"r_1 = {_number(gains.design.r1)}$$",
         _display(diophantine_system(specification)._repr_latex_()),
-        "Solved in letters:",
-        _display(rst_closed_form()._repr_latex_()),
+        *(() if closed is None else ("Solved in letters:", _display(closed._repr_latex_()))),
         f"Residual of the numbers above: {gains.design.residual:.2g} of $A_o A_m$.",
     )
 
 
+def _closed_form(specification: RSTSpecification) -> ClosedForm | None:
+    """The coefficients in letters, where the package has derived them."""
+    if specification.degree == 1:
+        return rst_closed_form()
+    return integral_rst_closed_form() if specification.internal_model == (1.0, 0.0) else None
+
+
 def _adaptation(gains: GainSet) -> tuple[str, ...]:
-    scheme = AugmentedError(model=unfiltered_error_model(design_rst_exact(gains.specification)))
     scaling = ", ".join(_number(value) for value in gains.design.scaling)
     start = ", ".join(_number(value) for value in gains.initial_gains)
     bias = (
@@ -127,12 +150,25 @@ def _adaptation(gains: GainSet) -> tuple[str, ...]:
     )
     return (
         "# Adaptation",
-        _display(scheme._repr_latex_()),
-        "with $Q = A_o A_m$, $P_1 = A_m$, $P_2 = A_o$. In scaled gains "
-        "$\\theta = D \\hat\\theta$, $\\hat\\varphi = b_0 D \\varphi$:",
-        f"$$D = \\mathrm{{diag}}({scaling}), \\qquad \\hat\\theta(0) = ({start})^T$$",
+        *_error_model(gains.specification),
+        "In scaled gains $\\theta = \\Sigma \\hat\\theta$, $\\hat\\varphi = b_0 \\Sigma \\varphi$:",
+        f"$$\\Sigma = \\mathrm{{diag}}({scaling}), \\qquad \\hat\\theta(0) = ({start})^T$$",
         *law_formulas(gains.law),
         bias,
+    )
+
+
+def _error_model(specification: RSTSpecification) -> tuple[str, ...]:
+    if specification.degree == 1:
+        model = unfiltered_error_model(design_rst_exact(specification))
+        return (
+            _display(AugmentedError(model=model)._repr_latex_()),
+            "with $Q = A_o A_m$, $P_1 = A_m$, $P_2 = A_o$.",
+        )
+    return (
+        _INTERNAL_MODEL_ERROR.replace("DEGREE", f"{{{specification.degree}}}").strip(),
+        f"with $P_1 = A_m$, $K = (p + c) D - A_o$ and $c = {_number(specification.adapted_pole)}$; "
+        "the first entry of $\\theta$ is $r_1 - c$.",
     )
 
 

@@ -9,24 +9,24 @@ from __future__ import annotations
 import hashlib
 import json
 import math
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from functools import cache
 from pathlib import Path
 from typing import Any
 
 from mrac_design.controller.linearisation import RobotModelError
 from mrac_design.controller.reference import DirectReference, ModelInverse
-from mrac_design.design import ReferenceModel, RSTSpecification
-from mrac_design.errors import GainFileError, MracDesignError
+from mrac_design.design import ReferenceModel, RSTDesign, RSTSpecification
+from mrac_design.errors import GainFileError, MracDesignError, ParameterError
 from mrac_design.export.gain_laws import law_document, law_of, quantities, quantity
-from mrac_design.export.gain_set import COEFFICIENT_NAMES, GainSet, RobotFingerprint
+from mrac_design.export.gain_set import GainSet, RobotFingerprint
 from mrac_design.plant import ForcePlant
 
-FORMAT = "mrac_design gains 2"
+FORMAT = "mrac_design gains 3"
 """First entry of every document; the number changes when the structure does."""
 
-COEFFICIENT_UNITS = ("1/s", "m/(N·s²)", "m/(N·s³)", "m/(N·s²)", "m/(N·s³)")
-"""Units of r1, s0, s1, t0, t1."""
+_POLYNOMIAL_UNIT = "1/s^i"
+"""Unit of the coefficients of a monic polynomial in p, i counted from 0."""
 
 _FEEDFORWARDS: Mapping[str, DirectReference | ModelInverse] = {
     "direct": DirectReference(),
@@ -42,7 +42,7 @@ def gains_schema_path() -> Path:
 def document_of(gains: GainSet) -> dict[str, Any]:
     """Gains as plain data.
 
-    `gains` holds r1 itself (the adapted one is r1 − ao); `scaling` is D of θ = D θ̂; `design.hash`
+    `gains` holds r1 itself (the adapted one is r1 − c); `scaling` is D of θ = D θ̂; `design.hash`
     is the SHA-256 of design and gains, `hash` that of everything else in canonical JSON.
     """
     specification = gains.specification
@@ -52,9 +52,10 @@ def document_of(gains: GainSet) -> dict[str, Any]:
         "velocity_gain": quantity(plant.velocity_gain, "1/s"),
         "bandwidth": quantity(model.bandwidth, "rad/s"),
         "damping": quantity(model.damping, "1"),
-        "observer_pole": quantity(specification.observer_pole, "rad/s"),
+        "observer": quantities(specification.observer, _POLYNOMIAL_UNIT),
+        "internal_model": quantities(specification.internal_model, _POLYNOMIAL_UNIT),
     }
-    coefficients = _named(gains.coefficients)
+    coefficients = _named(gains.design, gains.coefficients)
     content = {
         "format": FORMAT,
         "mrac_design": gains.package_version,
@@ -62,7 +63,7 @@ def document_of(gains: GainSet) -> dict[str, Any]:
         "robot": {"file": gains.robot.file, "sha256": gains.robot.sha256},
         "design": {**design, "hash": document_hash({**design, "gains": coefficients})},
         "gains": coefficients,
-        "scaling": _named(tuple(gains.design.scaling.tolist())),
+        "scaling": _named(gains.design, gains.design.scaling.tolist()),
         "initial_gains": quantities(gains.initial_gains, "1"),
         "prefilter": _prefilter_document(gains.prefilter),
         "feedforward": "direct" if gains.feedforward == DirectReference() else "model_inverse",
@@ -113,19 +114,21 @@ def gains_of(document: Mapping[str, Any], path: Path) -> GainSet:
 def _build(document: Mapping[str, Any]) -> GainSet:
     design, linearisation = document["design"], document["linearisation"]
     prefilter = document["prefilter"]
+    specification = RSTSpecification(
+        plant=ForcePlant(
+            stiffness=design["stiffness"]["value"],
+            velocity_gain=design["velocity_gain"]["value"],
+        ),
+        reference_model=_second_order(design),
+        observer=tuple(design["observer"]["values"]),
+        internal_model=tuple(design["internal_model"]["values"]),
+    )
     return GainSet(
         scenario=document["scenario"],
         package_version=document["mrac_design"],
         robot=RobotFingerprint(**document["robot"]),
-        specification=RSTSpecification(
-            plant=ForcePlant(
-                stiffness=design["stiffness"]["value"],
-                velocity_gain=design["velocity_gain"]["value"],
-            ),
-            reference_model=_second_order(design),
-            observer_pole=design["observer_pole"]["value"],
-        ),
-        coefficients=tuple(document["gains"][name]["value"] for name in COEFFICIENT_NAMES),
+        specification=specification,
+        coefficients=_coefficients(document["gains"], specification),
         initial_gains=tuple(document["initial_gains"]["values"]),
         prefilter=None if prefilter["kind"] == "none" else _second_order(prefilter),
         feedforward=_FEEDFORWARDS[document["feedforward"]],
@@ -139,11 +142,22 @@ def _build(document: Mapping[str, Any]) -> GainSet:
     )
 
 
-def _named(values: tuple[float, ...]) -> dict[str, Any]:
+def _named(design: RSTDesign, values: Sequence[float]) -> dict[str, Any]:
     return {
         name: quantity(value, unit)
-        for name, value, unit in zip(COEFFICIENT_NAMES, values, COEFFICIENT_UNITS, strict=True)
+        for (name, _, unit), value in zip(design.coefficients, values, strict=True)
     }
+
+
+def _coefficients(
+    document: Mapping[str, Any], specification: RSTSpecification
+) -> tuple[float, ...]:
+    names = ("r1", *specification.gain_names[1:])
+    if set(names) != set(document):
+        raise ParameterError(
+            "gains", ", ".join(document), f"must be {', '.join(names)} with this observer"
+        )
+    return tuple(document[name]["value"] for name in names)
 
 
 def _prefilter_document(prefilter: ReferenceModel | None) -> dict[str, Any]:

@@ -19,7 +19,7 @@ import numpy as np
 
 from mrac_design.arrays import readonly
 from mrac_design.controller.adaptation import AdaptationLaw
-from mrac_design.controller.adaptive import GAIN_NAMES, AdaptiveRST, build_step
+from mrac_design.controller.adaptive import AdaptiveRST, build_step
 from mrac_design.controller.linearisation import RobotModelError, build_linearisation
 from mrac_design.controller.reference import DirectReference, ModelInverse
 from mrac_design.controller.robot_step import RobotStep, build_robot_step
@@ -31,9 +31,6 @@ from mrac_design.robot import available_robots, build_dynamics, load_robot
 from mrac_design.simulation.scenario import Scenario
 from mrac_design.study import VARIANTS, Variant, variant_controller
 from mrac_design.time_domain import Continuous, Discrete, TimeDomain
-
-COEFFICIENT_NAMES = ("r1", "s0", "s1", "t0", "t1")
-"""Entries of `GainSet.coefficients`, in order."""
 
 # T follows from Ao by one product; another processor may round it otherwise.
 _T_TOLERANCE = 1e-12
@@ -64,11 +61,11 @@ class GainSet:
     robot: RobotFingerprint
     """The robot file they were made for."""
     specification: RSTSpecification
-    """Plant (Ks, K2), reference model (ω, ξ) and observer pole ao."""
+    """Plant (Ks, K2), reference model (ω, ξ), observer Ao and internal model D."""
     coefficients: tuple[float, ...]
-    """(r1, s0, s1, t0, t1) of R = p + r1, S = s0 p + s1, T = t0 p + t1, SI units."""
+    """(r1, s0 … sn, t0 … tn) of R = (p + r1) D, S = s0 pⁿ + … + sn and T likewise, SI units."""
     initial_gains: tuple[float, ...]
-    """θ̂(0), scaled start of (r1 − ao, s0, s1, t0, t1), dimensionless."""
+    """θ̂(0), scaled start of (r1 − c, s0 … sn, t0 … tn), dimensionless."""
     prefilter: ReferenceModel | None
     """Pre-filter of the force reference; none: F_d = r."""
     feedforward: DirectReference | ModelInverse
@@ -85,13 +82,14 @@ class GainSet:
     """The design with exactly these coefficients, its residual evaluated at them."""
 
     def __post_init__(self) -> None:
-        if len(self.coefficients) != 5 or not np.all(np.isfinite(self.coefficients)):
-            raise ParameterError("gains", self.coefficients, "needs five finite numbers")
+        count = len(self.specification.gain_names)
+        if len(self.coefficients) != count or not np.all(np.isfinite(self.coefficients)):
+            raise ParameterError("gains", self.coefficients, f"needs {count} finite numbers")
         if not 0 < self.tool_axis_bandwidth < math.inf:
             raise ParameterError("tool_axis_bandwidth", self.tool_axis_bandwidth, "must be > 0")
         object.__setattr__(self, "design", _design(self.specification, self.coefficients))
-        controller_of(self, Continuous())  # refuses what no controller can have
-        self.law.parameters(len(GAIN_NAMES))
+        controller = controller_of(self, Continuous())  # refuses what no controller can have
+        self.law.parameters(len(controller.gain_names))
 
     def _repr_markdown_(self) -> str:
         return self.design._repr_markdown_()
@@ -111,7 +109,7 @@ def gain_set(scenario: Scenario, design: RSTDesign, variant: Variant = VARIANTS[
         package_version=version("mrac-design"),
         robot=robot_fingerprint(scenario.robot),
         specification=design.specification,
-        coefficients=tuple(getattr(design, name) for name in COEFFICIENT_NAMES),
+        coefficients=tuple(value for _, value, _ in design.coefficients),
         initial_gains=controller.initial_gains,
         prefilter=controller.prefilter,
         feedforward=feedforward,
@@ -191,20 +189,22 @@ def _require_complete(gains: GainSet, controller: AdaptiveRST) -> None:
 
 def _design(specification: RSTSpecification, coefficients: tuple[float, ...]) -> RSTDesign:
     """The design of `specification` with the given coefficients put in and judged."""
-    r1, s0, s1, t0, t1 = coefficients
+    r1, *rest = coefficients
+    S, T = np.split(np.array(rest), 2)
+    R = np.convolve([1.0, r1], specification.internal_model)
     solved = design_rst(specification).solved
-    R, S, T = np.array([1.0, r1]), np.array([s0, s1]), np.array([t0, t1])
     problem = specification.placement
     residual = relative_residual(problem.process.A, problem.process.B, problem.closed_loop, R, S)
     if not residual <= RESIDUAL_LIMIT:
         raise ParameterError(
             "gains",
-            (r1, s0, s1),
+            coefficients,
             f"leave a residual of {residual:.2g} in A R + b0 S = Ao Am, more than "
             f"{RESIDUAL_LIMIT:g}: they do not belong to this design",
         )
     if not np.allclose(T, solved.T, rtol=_T_TOLERANCE, atol=0.0):
         wanted = ", ".join(f"{value:.9g}" for value in solved.T)
-        raise ParameterError("t0, t1", (t0, t1), f"must be ω²/b0 times Ao: {wanted}")
+        names = ", ".join(specification.gain_names[-len(T) :])
+        raise ParameterError(names, tuple(T.tolist()), f"must be ω²/b0 times Ao: {wanted}")
     placed = replace(solved, R=readonly(R), S=readonly(S), T=readonly(T), residual=residual)
     return RSTDesign(specification=specification, solved=placed)

@@ -221,7 +221,7 @@ def error_split_figure(signals: Sequence[AdaptationSignals]) -> CaptionedFigure:
 
 @styled()
 def box_figure(assessment: Assessment, certificate: StabilityCertificate) -> CaptionedFigure:
-    """Paths of r1', s0, s1 beside the certified box, relative to nominal (%)."""
+    """Paths of r1', s0 … sn beside the certified box, relative to nominal (%)."""
     nominal = np.array([to_float(v) for v in certificate.loop.scaled_gains])
     upper = np.array([to_float(v) for v in certificate.box.upper])
     share = 100 * float((upper / nominal - 1).max())
@@ -230,8 +230,9 @@ def box_figure(assessment: Assessment, certificate: StabilityCertificate) -> Cap
         "Gains of the run, relative to nominal, each on a scale of its own. The certified box is "
         f"±{share:.3g} %.",
     )
-    panels = figure.subplots(1, 3)
-    for k, (ax, name) in enumerate(zip(panels, ("r_1'", "s_0", "s_1"), strict=True)):
+    names = ("r_1'", *(f"s_{i}" for i in range(len(nominal) - 1)))
+    panels = figure.subplots(1, len(names))
+    for k, (ax, name) in enumerate(zip(panels, names, strict=True)):
         for part, colour in zip(assessment.signals, SERIES_COLOURS, strict=False):
             percent = 100 * (part.gains[:, k] / nominal[k] - 1)
             ax.plot(*thinned(part.time, percent, 800), color=colour, label=part.axis)

@@ -2,7 +2,10 @@
 
 from __future__ import annotations
 
+import numpy as np
+
 from mrac_design.motion.heart import Origin
+from mrac_design.polynomials.rationals import polynomial_latex
 from mrac_design.report.tables import Quantity, Table
 from mrac_design.study import StudyRecord
 
@@ -67,7 +70,8 @@ def _controller(study: StudyRecord) -> tuple[Quantity, ...]:
         _published(r"pre-filter $\omega$", prefilter.bandwidth, "rad/s", 50.0),
         _published(r"pre-filter $\xi$", prefilter.damping, "", 1.0),
         Quantity("velocity gain $K_2$", f"{choice.velocity_gain:g} 1/s", assumed, "not in [Z]"),
-        Quantity("observer pole $a_o$", f"{choice.observer_pole:g} rad/s", assumed, "not in [Z]"),
+        Quantity("observer $A_o$", _polynomial(choice.observer), assumed, "not in [Z]"),
+        Quantity("internal model $D$", _polynomial(choice.internal_model), assumed, "none in [Z]"),
         Quantity(
             "tool axis bandwidth",
             f"{choice.tool_axis_bandwidth:g} rad/s",
@@ -88,18 +92,15 @@ def _controller(study: StudyRecord) -> tuple[Quantity, ...]:
 
 
 def _derived(study: StudyRecord) -> tuple[Quantity, ...]:
-    design, derived = study.design, Origin.DERIVED.value
-    gains = (
-        ("$r_1$", design.r1, "1/s"),
-        ("$s_0$", design.s0, "m/(N·s²)"),
-        ("$s_1$", design.s1, "m/(N·s³)"),
-        ("$t_0$", design.t0, "m/(N·s²)"),
-        ("$t_1$", design.t1, "m/(N·s³)"),
-    )
+    derived = Origin.DERIVED.value
     return tuple(
-        Quantity(name, f"{value:.6g} {unit}", derived, "Diophantine equation")
-        for name, value, unit in gains
+        Quantity(f"${name[0]}_{name[1:]}$", f"{value:.6g} {unit}", derived, "Diophantine equation")
+        for name, value, unit in study.design.coefficients
     )
+
+
+def _polynomial(coefficients: tuple[float, ...]) -> str:
+    return f"${polynomial_latex(np.array(coefficients), 'p')}$"
 
 
 def _published(name: str, value: float, unit: str, published: float) -> Quantity:

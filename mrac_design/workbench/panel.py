@@ -29,6 +29,8 @@ SLIDERS = {
 }
 """Field of DesignValues → label, least value, largest value, step."""
 
+_SUBSCRIPTS = str.maketrans("0123456789", "₀₁₂₃₄₅₆₇₈₉")
+
 
 class DesignPanel:
     """A design panel: sliders, the figures of merit, the picture, and room for a complaint."""
@@ -105,8 +107,8 @@ def _slider(name: str, value: float) -> widgets.FloatSlider:
 
 def _summary(view: DesignView) -> str:
     gains = ", ".join(
-        f"{name} = {getattr(view.design, key):.5g}"
-        for name, key in (("r₁", "r1"), ("s₀", "s0"), ("s₁", "s1"), ("t₀", "t0"), ("t₁", "t1"))
+        f"{name.translate(_SUBSCRIPTS)} = {value:.5g}"
+        for name, value, _ in view.design.coefficients
     )
     return f"<p>{html.escape(view.text)}<br>{gains}</p>"
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -51,7 +51,8 @@ class DesignValues:
     damping: float
     """ξ of the reference model (–)."""
     observer_pole: float
-    """ao of the observer polynomial (rad/s)."""
+    """ao of the observer polynomial p + ao (rad/s); of an observer with several poles their
+    geometric mean, all of them moving in proportion."""
     adaptation_gain: float
     """Scaled adaptation gain γ̂; 0 freezes the gains."""
     stiffness: float
@@ -96,7 +97,7 @@ def initial_values(scenario: Scenario) -> DesignValues:
         velocity_gain=choice.velocity_gain,
         bandwidth=choice.bandwidth,
         damping=choice.damping,
-        observer_pole=choice.observer_pole,
+        observer_pole=_mean_pole(choice.observer),
         adaptation_gain=scenario.adaptation.gain,
         stiffness=scenario.stiffness,
     )
@@ -159,7 +160,14 @@ def _labelled(ax: Axes) -> list[Line2D]:
     return [each for each in ax.get_lines() if not str(each.get_label()).startswith("_")]
 
 
+def _mean_pole(observer: Sequence[float]) -> float:
+    """Geometric mean of the poles of a stable monic polynomial (rad/s)."""
+    return float(observer[-1] ** (1 / (len(observer) - 1)))
+
+
 def _with_values(values: DesignValues, scenario: Scenario) -> Scenario:
+    observer = scenario.design.observer
+    faster = values.observer_pole / _mean_pole(observer)
     return replace(
         scenario,
         stiffness=values.stiffness,
@@ -168,7 +176,7 @@ def _with_values(values: DesignValues, scenario: Scenario) -> Scenario:
             velocity_gain=values.velocity_gain,
             bandwidth=values.bandwidth,
             damping=values.damping,
-            observer_pole=values.observer_pole,
+            observer=tuple(value * faster**i for i, value in enumerate(observer)),
         ),
         adaptation=replace(scenario.adaptation, gain=values.adaptation_gain),
         simulation=replace(scenario.simulation, duration=DURATION),

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from functools import cache
 
 from hypothesis import strategies as st
@@ -31,20 +32,25 @@ def nominal_gain_set() -> GainSet:
     return gain_set(scenario, scenario_design(scenario), VARIANTS[-1])
 
 
+@cache
+def internal_model_gain_set() -> GainSet:
+    """Gains of a third-degree observer with a damped resonance in R."""
+    scenario = load_scenario("nominal")
+    choice = replace(
+        scenario.design,
+        observer=(1.0, 500.0, 90000.0, 6e6),
+        internal_model=(1.0, 10.0, 1400.0),
+    )
+    scenario = replace(scenario, design=choice)
+    return gain_set(scenario, scenario_design(scenario), VARIANTS[-1])
+
+
 def numbers(low: float, high: float, digits: int = 17):
     """Floats of at most `digits` decimal digits, the limits included."""
     return st.floats(low, high).map(lambda x: min(max(float(f"{x:.{digits}g}"), low), high))
 
 
 positive = numbers(1e-9, 1e9)
-scaled = st.lists(numbers(-1e3, 1e3), min_size=5, max_size=5).map(tuple)
-gains = st.one_of(
-    numbers(0.0, 100.0), st.lists(numbers(0.0, 100.0), min_size=6, max_size=6).map(tuple)
-)
-innermost = st.one_of(
-    gains.map(lambda gain: GradientLaw(gain=gain)),
-    st.builds(NormalisedGradientLaw, gain=gains, alpha=positive),
-)
 
 
 @st.composite
@@ -56,8 +62,12 @@ def boxes(draw) -> GainBox:
 
 
 @st.composite
-def laws(draw):
-    law = draw(innermost)
+def laws(draw, gains):
+    """Laws with any wrappers, the innermost one's gain drawn from `gains`."""
+    law = draw(
+        gains.map(lambda gain: GradientLaw(gain=gain))
+        | st.builds(NormalisedGradientLaw, gain=gains, alpha=positive)
+    )
     for wrapper in draw(st.permutations(range(4)))[: draw(st.integers(0, 4))]:
         centre = draw(st.lists(numbers(-1e3, 1e3), max_size=6).map(tuple))
         size = draw(numbers(0.0, 1e3))
@@ -71,8 +81,34 @@ def laws(draw):
 
 
 @st.composite
+def observers(draw, digits: int = 17) -> tuple[tuple[float, ...], tuple[float, ...]]:
+    """Ao of degree 1, 2 or 3 and D of one degree less: none, p or a resonance, damped or not."""
+
+    def pole() -> float:
+        return draw(numbers(10.0, 3000.0, digits))
+
+    def pair(least: float, most: float) -> tuple[float, float, float]:
+        frequency, damping = draw(numbers(least, most, 5)), draw(numbers(0.2, 1.5, 3))
+        return 1.0, float(f"{2 * damping * frequency:.{digits}g}"), frequency * frequency
+
+    degree = draw(st.integers(1, 3))
+    if degree == 1:
+        return (1.0, pole()), (1.0,)
+    if degree == 2:
+        root = draw(st.just(0.0) | numbers(1e-3, 20.0, digits))
+        return pair(10.0, 1000.0), (1.0, draw(st.sampled_from([root, -root])))
+    _, damping, stiffness = pair(10.0, 1000.0)
+    last = pole()
+    cubic = (1.0, damping + last, stiffness + damping * last, stiffness * last)
+    _, damping, stiffness = pair(2.0, 60.0)
+    observer = tuple(float(f"{value:.{digits}g}") for value in cubic)
+    return observer, (1.0, damping * draw(st.sampled_from([0.0, 0.1, 1.0])), stiffness)
+
+
+@st.composite
 def gain_sets(draw, digits: int = 17) -> GainSet:
     """Gains of random designs; their numbers have at most `digits` digits."""
+    observer, internal_model = draw(observers(digits))
 
     def model(low: float, high: float) -> ReferenceModel:
         return ReferenceModel(
@@ -86,10 +122,14 @@ def gain_sets(draw, digits: int = 17) -> GainSet:
                 velocity_gain=draw(st.just(0.0) | numbers(1e-3, 300.0, digits)),
             ),
             reference_model=model(10.0, 2000.0),
-            observer_pole=draw(numbers(10.0, 3000.0, digits)),
+            observer=observer,
+            internal_model=internal_model,
         )
     )
     factor = numbers(0.5, 2.0)
+    count = len(design.coefficients)
+    scaled = st.lists(numbers(-1e3, 1e3), min_size=count, max_size=count).map(tuple)
+    several = st.lists(numbers(0.0, 100.0), min_size=count + 1, max_size=count + 1).map(tuple)
     return GainSet(
         scenario=draw(
             st.text(
@@ -103,11 +143,11 @@ def gain_sets(draw, digits: int = 17) -> GainSet:
         package_version="0.1.0",
         robot=RobotFingerprint(file="robot.toml", sha256="0" * 64),
         specification=design.specification,
-        coefficients=(design.r1, design.s0, design.s1, design.t0, design.t1),
+        coefficients=tuple(value for _, value, _ in design.coefficients),
         initial_gains=draw(scaled | st.just(tuple(design.scaled_parameters.tolist()))),
         prefilter=model(1.0, 100.0) if draw(st.booleans()) else None,
         feedforward=draw(st.sampled_from([DirectReference(), ModelInverse()])),
-        law=draw(laws()),
+        law=draw(laws(numbers(0.0, 100.0) | several)),
         bias_force=draw(numbers(0.0, 10.0)),
         tool_axis_bandwidth=draw(positive),
         robot_model=RobotModelError(body_scale=draw(factor), first_joint_scale=draw(factor)),

@@ -19,7 +19,7 @@ from mrac_design.export.control_objects import (
 )
 from mrac_design.export.gains import controller_of
 from mrac_design.time_domain import Continuous, Discrete
-from tests.export.gain_sets import gain_sets, nominal_gain_set
+from tests.export.gain_sets import gain_sets, internal_model_gain_set, nominal_gain_set
 
 
 @settings(max_examples=60, deadline=None, suppress_health_check=[HealthCheck.too_slow])
@@ -35,7 +35,7 @@ def test_a_design_changed_in_python_control_becomes_gains():
     gains, pieces = nominal_gain_set(), loop_pieces(nominal_gain_set())
     other = replace(
         gains,
-        specification=replace(gains.specification, observer_pole=400.0),
+        specification=replace(gains.specification, observer=(1.0, 400.0)),
         coefficients=(1350.0, 728.125, 125000.0, 312.5, 125000.0),
     )
     changed = redesigned(gains, loop_pieces(other))
@@ -47,6 +47,21 @@ def test_a_design_changed_in_python_control_becomes_gains():
         redesigned(gains, replace(pieces, plant=control.tf([900.0], [1.0, 50.0, 0.0])))
 
 
+def test_an_internal_model_moves_in_and_out_through_python_control():
+    """R holds D as a factor; gains that started from the design's own follow its count."""
+    plain, resonant = nominal_gain_set(), internal_model_gain_set()
+    there = redesigned(plain, loop_pieces(resonant))
+    assert there.specification == resonant.specification
+    assert there.initial_gains == resonant.initial_gains
+    assert redesigned(there, loop_pieces(plain)) == plain
+    detuned = replace(loop_pieces(resonant), internal_model=control.tf([1.0], [1.0, 10.0, 1500.0]))
+    with pytest.raises(ParameterError, match="must have the internal model"):
+        redesigned(resonant, detuned)
+    own = replace(plain, initial_gains=(0.5,) * 5)
+    with pytest.raises(ParameterError, match="initial gains"):
+        redesigned(own, loop_pieces(resonant))
+
+
 @pytest.mark.parametrize(
     ("name", "system"),
     [
@@ -55,6 +70,10 @@ def test_a_design_changed_in_python_control_becomes_gains():
         ("feedforward", control.tf([1.0, 1.0], [1.0, 2.0, 3.0])),
         ("feedforward", control.tf([312.5, 156250.0], [1.0, 1451.0])),
         ("observer", control.tf([1.0, 1.0], [1.0, 500.0])),
+        ("observer", control.tf([1.0], [1.0, 500.0], dt=1e-3)),
+        ("observer", control.tf([1.0], [1.0, 20.0, 100.0])),
+        ("internal_model", control.tf([1.0], [1.0, 0.0])),
+        ("internal_model", control.tf([2.0], [1.0])),
         ("reference_model", control.tf([1.0], [1.0, 500.0])),
         ("plant", control.tf([800.0], [1.0, 50.0, 1.0])),
     ],
@@ -65,18 +84,21 @@ def test_pieces_of_another_shape_are_refused(name, system):
         redesigned(nominal_gain_set(), pieces)
 
 
-def test_pieces_close_to_the_reference_model():
+@pytest.mark.parametrize("made", [nominal_gain_set, internal_model_gain_set])
+def test_pieces_close_to_the_reference_model(made):
     """Closing the pieces as the block diagram says gives ω²/Am from u_c to y."""
-    pieces = loop_pieces(nominal_gain_set())
+    pieces = loop_pieces(made())
     closed = pieces.feedforward * control.feedback(pieces.plant, pieces.feedback)
     for omega in (1.0, 50.0, 500.0, 5000.0):
         # Products of polynomials spread over 16 decades.
         assert closed(1j * omega) == pytest.approx(pieces.reference_model(1j * omega), rel=1e-9)
 
 
-def test_state_space_is_the_two_transfer_functions():
-    gains, pieces = nominal_gain_set(), loop_pieces(nominal_gain_set())
+@pytest.mark.parametrize("made", [nominal_gain_set, internal_model_gain_set])
+def test_state_space_is_the_two_transfer_functions(made):
+    gains, pieces = made(), loop_pieces(made())
     system = frozen_state_space(gains)
+    assert system.nstates == gains.specification.degree
     for s in (0.0, 3j, 700j, 1e4j):
         response = system(s)
         np.testing.assert_allclose(response[0, 0], pieces.feedforward(s), rtol=1e-12)

@@ -17,11 +17,12 @@ from mrac_design.controller.robust import (
     WithLeakage,
     WithProjection,
 )
+from mrac_design.design import design_rst
 from mrac_design.errors import FileError, ParameterError
 from mrac_design.export.formulas import formulas_markdown, law_formulas, write_formulas
 from mrac_design.export.gains import document_of
 from mrac_design.robot import load_robot
-from tests.export.gain_sets import nominal_gain_set
+from tests.export.gain_sets import internal_model_gain_set, nominal_gain_set
 
 ROBOT = load_robot("d2m2_set_a")
 
@@ -45,6 +46,32 @@ def test_the_document_is_latex_with_every_number(tmp_path):
     assert again.count("$$") >= 20
     assert r"\begin{pmatrix}" in again
     assert [path.name for path in tmp_path.iterdir()] == ["formulas.tex"]
+
+
+def test_an_internal_model_is_in_the_formulas(tmp_path):
+    gains = internal_model_gain_set()
+    text = formulas_markdown(gains, ROBOT)
+    assert "D = p^{2} + 10\\,p + 1400" in text
+    assert "A_o = p^{3} + 500\\,p^{2} + 90000\\,p" in text
+    assert "c = 490$" in text  # (p + 490) D begins like Ao
+    assert "p^{3} y" in text
+    assert "Solved in letters" not in text
+    for value in (gains.coefficients[0], *gains.initial_gains, *gains.design.scaling):
+        assert f"{value:.10g}".partition("e")[0] in text, value
+    for value in gains.coefficients[1:]:
+        assert f"{value:.6g}".partition("e")[0] in text, value
+    write_formulas(gains, ROBOT, tmp_path / "formulas.tex")
+    integral = replace(
+        gains.specification, observer=(1.0, 400.0, 90000.0), internal_model=(1.0, 0.0)
+    )
+    design = design_rst(integral)
+    lettered = replace(
+        gains,
+        specification=integral,
+        coefficients=tuple(value for _, value, _ in design.coefficients),
+        initial_gains=tuple(design.scaled_parameters.tolist()),
+    )
+    assert r"\alpha_2" in formulas_markdown(lettered, ROBOT)
 
 
 def test_what_is_switched_off_is_said_to_be():

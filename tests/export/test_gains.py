@@ -39,10 +39,13 @@ from mrac_design.resources import models_directory
 from mrac_design.simulation.scenario import load_scenario
 from mrac_design.study import VARIANTS, scenario_design, variant_controller
 from mrac_design.time_domain import Continuous, Discrete
-from tests.export.gain_sets import gain_sets, nominal_gain_set
+from tests.export.gain_sets import gain_sets, internal_model_gain_set, nominal_gain_set
 from tests.export.scenario_step import scenario_robot_step
 
 SUFFIXES = (".json", ".toml", ".yaml", ".yml", ".mat")
+
+
+BOTH = {"paper": nominal_gain_set, "internal model": internal_model_gain_set}
 
 
 def parameters(gains, domain) -> bytes:
@@ -73,8 +76,9 @@ def test_the_step_read_back_has_the_same_bits(tmp_path_factory, gains):
 
 
 @pytest.mark.parametrize("variant", VARIANTS, ids=lambda variant: variant.name)
-def test_gains_are_those_of_the_study(variant):
-    scenario = load_scenario("nominal")
+@pytest.mark.parametrize("name", ["nominal", "reality"])  # without and with internal model
+def test_gains_are_those_of_the_study(name, variant):
+    scenario = load_scenario(name)
     scenario = replace(scenario, adaptation=replace(scenario.adaptation, bias_force=0.7))
     design = scenario_design(scenario)
     gains = gain_set(scenario, design, variant)
@@ -114,21 +118,25 @@ def test_nothing_of_a_controller_gets_lost(monkeypatch):
         gain_set(scenario, scenario_design(scenario))
 
 
-def test_gains_that_solve_no_design_are_no_gains():
-    gains = nominal_gain_set()
-    r1, s0, s1, t0, t1 = gains.coefficients
+@pytest.mark.parametrize("made", BOTH.values(), ids=BOTH)
+def test_gains_that_solve_no_design_are_no_gains(made):
+    gains = made()
+    r1, s0, *rest, last = gains.coefficients
     with pytest.raises(MracDesignError, match="residual"):
-        replace(gains, coefficients=(r1, s0 * (1 + 1e-6), s1, t0, t1))
+        replace(gains, coefficients=(r1, s0 * (1 + 1e-6), *rest, last))
     with pytest.raises(ParameterError, match="t0, t1"):
-        replace(gains, coefficients=(r1, s0, s1, t0 * (1 + 1e-6), t1))
+        replace(gains, coefficients=(r1, s0, *rest, last * (1 + 1e-6)))
     with pytest.raises(ParameterError, match="gains"):
-        replace(gains, coefficients=(r1, s0, s1, t0, float("nan")))
+        replace(gains, coefficients=(r1, s0, *rest, float("nan")))
+    with pytest.raises(ParameterError, match=f"needs {len(gains.coefficients)} finite"):
+        replace(gains, coefficients=gains.coefficients[:-1])
 
 
 def test_the_schema_is_closed_and_published_documents_fit_it():
     schema = json.loads(gains_schema_path().read_text("utf-8"))
     Draft202012Validator.check_schema(schema)
-    Draft202012Validator(schema).validate(document_of(nominal_gain_set()))
+    for made in BOTH.values():
+        Draft202012Validator(schema).validate(document_of(made()))
 
     def walk(part):
         if isinstance(part, dict):
@@ -139,6 +147,18 @@ def test_the_schema_is_closed_and_published_documents_fit_it():
                 walk(inner)
 
     walk(schema)
+
+
+def test_units_follow_the_powers_of_the_polynomials():
+    document = document_of(internal_model_gain_set())
+    units = {name: entry["unit"] for name, entry in document["gains"].items()}
+    powers = dict(zip("0123", "²³⁴⁵", strict=True))
+    assert units == {"r1": "1/s"} | {
+        f"{letter}{i}": f"m/(s{power}·N)" for letter in "st" for i, power in powers.items()
+    }
+    assert {name: entry["unit"] for name, entry in document["scaling"].items()} == units
+    assert document["design"]["observer"]["values"] == [1.0, 500.0, 90000.0, 6e6]
+    assert len(document["initial_gains"]["values"]) == 9
 
 
 def test_hash_follows_gains_and_nothing_else_does():
@@ -196,12 +216,13 @@ def _set(*keys, to):
 
 SPOILED = {
     "unknown key": (_set("gain", to=1.0), "unknown key gain"),
-    "unknown key inside": (_set("gains", "s2", to=1.0), "gains: unknown key s2"),
+    "unknown key inside": (_set("gains", "r2", to=1.0), "gains: unknown key r2"),
+    "former key": (_set("design", "observer_pole", to=1.0), "design: unknown key observer_pole"),
     "missing key": (lambda d: d["design"].pop("damping"), "design: damping missing"),
     "wrong unit": (_set("design", "stiffness", "unit", to="N/mm"), "stiffness.unit: is 'N/mm'"),
     "changed digit": (_set("gains", "s0", "value", to=846.876), "was changed after it was written"),
     "text for number": (_set("gains", "s0", "value", to="846"), "gains.s0.value: is '846'"),
-    "old format": (_set("format", to="mrac_design gains 1"), "format: is 'mrac_design gains 1'"),
+    "old format": (_set("format", to="mrac_design gains 2"), "format: is 'mrac_design gains 2'"),
     "unknown law": (_set("adaptation", "law", to="magic"), "adaptation.law: is 'magic'"),
     "wrong hash": (_set("hash", to="0" * 64), "hash: the content was changed"),
     "short hash": (_set("robot", "sha256", to="abc"), "robot.sha256"),
@@ -233,6 +254,13 @@ def test_a_spoiled_file_is_one_clear_error(tmp_path, suffix, case):
         (("adaptation", "normalisation", "value"), 0.0, "alpha"),
         (("gains", "s0", "value"), 846.0, "residual"),
         (("initial_gains", "values"), [1.0, 2.0], "initial_gains.values"),
+        (("initial_gains", "values"), [1.0] * 7, "initial gains"),
+        (("gains", "s2"), {"value": 1.0, "unit": "m/(s⁴·N)"}, "must be r1, s0, s1, t0, t1"),
+        (("gains", "s2"), {"value": 1.0, "unit": "m/(s³·N)"}, "gains.s2.unit"),
+        (("design", "observer", "values"), [1.0, 20.0, 100.0], "must be of degree 1"),
+        (("design", "observer", "values"), [1.0, -500.0], "left of 0"),
+        (("design", "observer", "unit"), "rad/s", "observer.unit"),
+        (("design", "internal_model", "values"), [], "internal_model.values"),
         (("scaling", "s0", "value"), 1.0, "do not belong"),
         (("design", "hash"), "0" * 64, "do not belong"),
         (("design", "bandwidth", "value"), -1.0, "bandwidth"),

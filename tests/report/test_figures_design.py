@@ -5,7 +5,7 @@ import math
 import numpy as np
 import pytest
 
-from mrac_design.design import ReferenceModel, RSTSpecification, design_rst
+from mrac_design.design import ReferenceModel, RSTSpecification, design_rst, first_order_observer
 from mrac_design.plant import ForcePlant
 from mrac_design.report.figures_design import (
     loop_figure,
@@ -24,7 +24,7 @@ def design():
         RSTSpecification(
             plant=ForcePlant(stiffness=800.0, velocity_gain=50.0),
             reference_model=ReferenceModel(bandwidth=500.0, damping=0.8),
-            observer_pole=400.0,
+            observer=first_order_observer(400.0),
         )
     )
 

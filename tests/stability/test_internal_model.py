@@ -14,6 +14,7 @@ from mrac_design.stability.certificate import vertices_of
 from mrac_design.stability.certification import certify, has_common_lyapunov_function
 from mrac_design.stability.claims import DecayClaim
 from mrac_design.stability.exact_matrix import to_floats
+from mrac_design.stability.instability import _proved_unstable
 from mrac_design.stability.parameter_box import ParameterBox, projection_bounds, relative_box
 from mrac_design.stability.rational_function import to_float
 from mrac_design.stability.sampled_loop import sampling
@@ -112,6 +113,17 @@ def test_a_sampled_corner_that_grows_refutes(case, share) -> None:
         step = vertices_matrix(case, values, Ks)
         worst = max(worst, float(np.abs(np.linalg.eigvals(step)).max()))
     assert worst > 1
+
+
+def test_what_is_stable_is_never_refuted() -> None:
+    """Every frozen corner is stable, but no common Lyapunov function is found: undecided."""
+    loop, timing = HEART_BAND.loop, sampling("1/1000", 1)
+    box = relative_box(loop, "0.065", TISSUE)
+    certificate = certify(loop, box, timing)
+    assert certificate.verdict is Verdict.UNDECIDED
+    assert "smaller" in certificate.reason
+    vertices = vertices_of(loop, box, timing)
+    assert not any(_proved_unstable([vertex]) for vertex in vertices[::5])
 
 
 def vertices_matrix(case: Placed, gains: np.ndarray, Ks: float) -> np.ndarray:

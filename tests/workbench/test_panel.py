@@ -53,7 +53,7 @@ def test_single_axis_obeys_the_closed_form_of_the_frozen_loop(scenario, start):
     heart = run["heart"][:, 0]
     velocity = np.gradient(heart, run.time)
     acceleration = np.gradient(velocity, run.time)
-    expected = -(100.0 * design.r1 * velocity + (100.0 + design.r1) * acceleration) / design.s1
+    expected = -(100.0 * design.r1 * velocity + (100.0 + design.r1) * acceleration) / design.S[1]
     error = run["force"][:, 0] - run["model_force"][:, 0]
     kept = (run.time > 0.3) & (run.time < run.time[-1] - 0.1)
     # Terms of order (motion frequency)/ω are left out: the motion's content ends near 8 Hz.
