@@ -127,6 +127,7 @@ def build_step(controller: AdaptiveRST) -> ControllerStep:
     own = len(GAIN_NAMES)
     return assemble_step(
         step,
+        time_domain=controller.time_domain,
         values=parameters.pack(values),
         command=command,
         following={
