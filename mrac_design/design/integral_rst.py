@@ -9,18 +9,13 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 
-import numpy as np
 from flint import fmpq_poly
-from numpy.typing import NDArray
 
-from mrac_design.arrays import FloatArray
 from mrac_design.design.factors import integrator
-from mrac_design.design.loop import FeedbackLoop
-from mrac_design.design.margins import StabilityMargins
+from mrac_design.design.placed import PlacedController
 from mrac_design.design.pole_placement import FollowModel, PolePlacement
 from mrac_design.design.polynomial_design import (
     ExactPolynomialDesign,
-    PolynomialDesign,
     place_poles,
     place_poles_exact,
 )
@@ -77,51 +72,11 @@ class IntegralRSTSpecification:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
-class IntegralRSTDesign:
+class IntegralRSTDesign(PlacedController):
     """R u = T uc − S y with R = p(p + r1), S = s0 p² + s1 p + s2, T = (ω²/b0) Ao."""
 
     specification: IntegralRSTSpecification
     """What was asked for."""
-
-    solved: PolynomialDesign
-    """The same controller as a solved pole placement."""
-
-    @property
-    def R(self) -> FloatArray:
-        """[1, r1, 0], highest power first."""
-        return self.solved.R
-
-    @property
-    def S(self) -> FloatArray:
-        """[s0, s1, s2], highest power first; m/(s²·N) times 1, 1/s, 1/s²."""
-        return self.solved.S
-
-    @property
-    def T(self) -> FloatArray:
-        """[t0, t1, t2], highest power first; units as S."""
-        return self.solved.T
-
-    @property
-    def residual(self) -> float:
-        """Largest coefficient of A R + b0 S − Ao Am relative to that of Ao Am."""
-        return self.solved.residual
-
-    @property
-    def loop(self) -> FeedbackLoop:
-        """The closed loop with the design plant; it has all sensitivities."""
-        return self.solved.loop
-
-    @property
-    def closed_loop_poles(self) -> NDArray[np.complex128]:
-        """Roots of A R + b0 S, (4,), rad/s."""
-        return self.loop.poles
-
-    def margins(self) -> StabilityMargins:
-        """Gain, phase, delay and modulus margin."""
-        return self.loop.margins()
-
-    def _repr_latex_(self) -> str:
-        return self.solved._repr_latex_()
 
 
 def design_integral_rst(

@@ -4,19 +4,14 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
 
-import numpy as np
 from flint import fmpq_poly
-from numpy.typing import NDArray
 
 from mrac_design.arrays import FloatArray, readonly
-from mrac_design.design.loop import FeedbackLoop
-from mrac_design.design.margins import StabilityMargins
+from mrac_design.design.placed import PlacedController
 from mrac_design.design.pole_placement import FollowModel, PolePlacement
 from mrac_design.design.polynomial_design import (
     ExactPolynomialDesign,
-    PolynomialDesign,
     place_poles,
     place_poles_exact,
 )
@@ -26,9 +21,6 @@ from mrac_design.errors import ParameterError
 from mrac_design.plant import ForcePlant
 from mrac_design.polynomials.diophantine import RESIDUAL_LIMIT, SylvesterSystem
 from mrac_design.polynomials.rationals import decimal_rational
-
-if TYPE_CHECKING:
-    import control
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -65,29 +57,11 @@ class RSTSpecification:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
-class RSTDesign:
-    """Controller R u = T uc − S y with R = p + r1, S = s0 p + s1, T = t0 p + t1."""
+class RSTDesign(PlacedController):
+    """R u = T uc − S y with R = p + r1, S = s0 p + s1, T = t0 p + t1."""
 
     specification: RSTSpecification
     """What was asked for."""
-
-    solved: PolynomialDesign
-    """The same controller as a solved pole placement."""
-
-    @property
-    def R(self) -> FloatArray:
-        """[1, r1], highest power first."""
-        return self.solved.R
-
-    @property
-    def S(self) -> FloatArray:
-        """[s0, s1], highest power first."""
-        return self.solved.S
-
-    @property
-    def T(self) -> FloatArray:
-        """[t0, t1], highest power first."""
-        return self.solved.T
 
     @property
     def r1(self) -> float:
@@ -115,12 +89,6 @@ class RSTDesign:
         return float(self.T[1])
 
     @property
-    def residual(self) -> float:
-        """Largest coefficient of A R + b0 S − Ao Am relative to that of Ao Am, recomputed
-        exactly from the float64 polynomials."""
-        return self.solved.residual
-
-    @property
     def parameters(self) -> FloatArray:
         """θ⁰ = (r1 − ao, s0, s1, t0, t1), the coefficients of R − P2, S and T [AW 5.71], (5,)."""
         return readonly(
@@ -140,40 +108,6 @@ class RSTDesign:
         """θ̂⁰ = D⁻¹ θ⁰, dimensionless, (5,)."""
         return readonly(self.parameters / self.scaling)
 
-    @property
-    def loop(self) -> FeedbackLoop:
-        """The closed loop with the design plant."""
-        return self.solved.loop
-
-    @property
-    def closed_loop_poles(self) -> NDArray[np.complex128]:
-        """Roots of A R + b0 S, (3,), rad/s."""
-        return self.loop.poles
-
-    def margins(self) -> StabilityMargins:
-        """Gain, phase, delay and modulus margin with the parameters frozen."""
-        return self.loop.margins()
-
-    def loop_transfer(self) -> control.TransferFunction:
-        """b0 S/(A R)."""
-        return self.loop.loop_transfer()
-
-    def disturbance_sensitivity(self) -> control.TransferFunction:
-        """S_d = p(p + K2)(p + r1)/(Ao Am), from d = −Ks Xh to the force."""
-        return self.loop.disturbance_sensitivity()
-
-    def complementary_sensitivity(self) -> control.TransferFunction:
-        """b0 S/(Ao Am), from force-sensor noise to minus the force."""
-        return self.loop.complementary_sensitivity()
-
-    def control_sensitivity(self) -> control.TransferFunction:
-        """A S/(Ao Am), from force-sensor noise to minus the command, m/(s²·N)."""
-        return self.loop.control_sensitivity()
-
-    def reference_transfer(self) -> control.TransferFunction:
-        """b0 T/(A R + b0 S), from uc to the force; its common factor Ao is left in."""
-        return self.loop.reference_transfer()
-
     def _repr_markdown_(self) -> str:
         rows = (
             ("r1", self.r1, "1/s"),
@@ -188,9 +122,6 @@ class RSTDesign:
             f"| coefficient | value | unit |\n|---|---|---|\n{body}\n"
             f"Closed-loop poles {poles} rad/s; Diophantine residual {self.residual:.2g}."
         )
-
-    def _repr_latex_(self) -> str:
-        return self.solved._repr_latex_()
 
 
 def diophantine_system(specification: RSTSpecification) -> SylvesterSystem:
