@@ -15,7 +15,7 @@ from mrac_design.comparison.contestant import (
     TunedAxis,
     TuningParameter,
 )
-from mrac_design.comparison.setting import AxisSetting
+from mrac_design.comparison.setting import AxisSetting, Periods
 from mrac_design.controller.adaptation import AdaptationLaw, NormalisedGradientLaw
 from mrac_design.controller.adaptive import GAIN_NAMES, AdaptiveRST, build_step, nominal_gains
 from mrac_design.controller.disturbance_observer import with_disturbance_observer
@@ -207,15 +207,15 @@ def _axis(
     return TunedAxis(step=step, velocity_gain=setting.velocity_gain)
 
 
-def _frozen(setting: AxisSetting, beat: float, values: FloatArray) -> TunedAxis:
+def _frozen(setting: AxisSetting, periods: Periods, values: FloatArray) -> TunedAxis:
     return _axis(setting, values, _STILL, feedforward=DirectReference())
 
 
-def _frozen_inverse(setting: AxisSetting, beat: float, values: FloatArray) -> TunedAxis:
+def _frozen_inverse(setting: AxisSetting, periods: Periods, values: FloatArray) -> TunedAxis:
     return _axis(setting, values, _STILL, feedforward=LeadingInverse(float(values[-1])))
 
 
-def _integral(setting: AxisSetting, beat: float, values: FloatArray) -> TunedAxis:
+def _integral(setting: AxisSetting, periods: Periods, values: FloatArray) -> TunedAxis:
     controller = integral_rst(
         IntegralRST(
             plant=setting.plant,
@@ -244,33 +244,33 @@ def _boxed(setting: AxisSetting, values: FloatArray, extra: int) -> WithProjecti
     )
 
 
-def _mrac(setting: AxisSetting, beat: float, values: FloatArray) -> TunedAxis:
+def _mrac(setting: AxisSetting, periods: Periods, values: FloatArray) -> TunedAxis:
     return _axis(setting, values, _law(values), feedforward=DirectReference())
 
 
-def _mrac_inverse(setting: AxisSetting, beat: float, values: FloatArray) -> TunedAxis:
+def _mrac_inverse(setting: AxisSetting, periods: Periods, values: FloatArray) -> TunedAxis:
     return _axis(setting, values, _law(values), feedforward=LeadingInverse(float(values[-1])))
 
 
-def _mrac_bias(setting: AxisSetting, beat: float, values: FloatArray) -> TunedAxis:
+def _mrac_bias(setting: AxisSetting, periods: Periods, values: FloatArray) -> TunedAxis:
     bias = float(values[4])
     return _axis(
         setting, values, _law(values), feedforward=LeadingInverse(float(values[-1])), bias=bias
     )
 
 
-def _mrac_certified(setting: AxisSetting, beat: float, values: FloatArray) -> TunedAxis:
+def _mrac_certified(setting: AxisSetting, periods: Periods, values: FloatArray) -> TunedAxis:
     law = _boxed(setting, values, len(GAIN_NAMES) - 5)
     return _axis(
         setting, values, law, feedforward=LeadingInverse(float(values[-1])), bias=float(values[4])
     )
 
 
-def _mrac_harmonic(setting: AxisSetting, beat: float, values: FloatArray) -> TunedAxis:
+def _mrac_harmonic(setting: AxisSetting, periods: Periods, values: FloatArray) -> TunedAxis:
     oscillator = Oscillator(
-        frequency=1.0 / beat,
-        lowest=0.7 / beat,
-        highest=1.4 / beat,
+        frequency=1.0 / periods.beat,
+        lowest=0.7 / periods.beat,
+        highest=1.4 / periods.beat,
         harmonics=HARMONICS,
         force=float(values[6]),
         tracking=float(values[7]),
@@ -299,9 +299,9 @@ def _observed(setting: AxisSetting, axis: TunedAxis, drive: float) -> TunedAxis:
     return replace(axis, step=step)
 
 
-def _frozen_observer(setting: AxisSetting, beat: float, values: FloatArray) -> TunedAxis:
-    return _observed(setting, _frozen_inverse(setting, beat, values), float(values[2]))
+def _frozen_observer(setting: AxisSetting, periods: Periods, values: FloatArray) -> TunedAxis:
+    return _observed(setting, _frozen_inverse(setting, periods, values), float(values[2]))
 
 
-def _mrac_observer(setting: AxisSetting, beat: float, values: FloatArray) -> TunedAxis:
-    return _observed(setting, _mrac_inverse(setting, beat, values), float(values[4]))
+def _mrac_observer(setting: AxisSetting, periods: Periods, values: FloatArray) -> TunedAxis:
+    return _observed(setting, _mrac_inverse(setting, periods, values), float(values[4]))

@@ -5,16 +5,18 @@ import pytest
 from scipy.linalg import expm
 
 from mrac_design.comparison.comparison import contestants
+from mrac_design.comparison.setting import Periods
 from mrac_design.controller.disturbance_observer import with_disturbance_observer
 from mrac_design.controller.reference import LeadingInverse, ModelInverse
 from mrac_design.design import ReferenceModel
 from mrac_design.errors import ParameterError
 
 ALL = {contestant.name: contestant for contestant in contestants()}
+PERIODS = Periods(beat=1.0, breath=5.0)
 
 
 def observed(setting, delay, drive=0.05):
-    inner = ALL["frozen_inverse"].build(setting, 1.0, ALL["frozen_inverse"].start).step
+    inner = ALL["frozen_inverse"].build(setting, PERIODS, ALL["frozen_inverse"].start).step
     return inner, with_disturbance_observer(
         inner, plant=setting.plant, domain=setting.domain, delay=delay, drive=drive,
         force_noise=5e-3,
@@ -56,7 +58,7 @@ def test_a_constant_disturbance_is_found_and_cancelled(setting, delay):
 def test_errors(setting):
     with pytest.raises(ParameterError, match="drive"):
         observed(setting, 1, drive=0.0)
-    preview = ALL["preview"].build(setting, 1.0, ALL["preview"].start).step
+    preview = ALL["preview"].build(setting, PERIODS, ALL["preview"].start).step
     with pytest.raises(ParameterError, match="force only"):
         with_disturbance_observer(
             preview, plant=setting.plant, domain=setting.domain, delay=1, drive=0.1,
