@@ -8,6 +8,7 @@ STAMP := $(VENV)/.installed
 
 report: $(STAMP)
 	$(BIN)/mrac report --out reports/nominal
+	$(BIN)/mrac paper --out reports/paper
 
 stability: $(STAMP)
 	$(BIN)/mrac stability --out reports/stability

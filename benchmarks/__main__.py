@@ -5,17 +5,19 @@ from __future__ import annotations
 import argparse
 import logging
 import multiprocessing
+import os
 from collections.abc import Sequence
 from concurrent.futures import ProcessPoolExecutor
 from pathlib import Path
 
-import numpy as np
 from rich.console import Console
 from rich.table import Table
 
 from benchmarks.measure import Result, machine
 from benchmarks.picture import draw
 from benchmarks.sections import measure_section
+from benchmarks.shows import Show, loop_shows, terms_shows
+from benchmarks.start_up import start_up
 from mrac_design.simulation.compilation import find_compiler
 
 CONSOLE = Console(width=150)
@@ -32,19 +34,18 @@ def main() -> None:
     if compiler is None:
         raise SystemExit("the benchmarks compare compiled code: install a C compiler")
     rounds = 5 if chosen.quick else 15
-    say = CONSOLE.print
-    say(machine())
+    CONSOLE.print(machine())
     duration = 1.0 if chosen.quick else 3.0
     terms = _apart("terms", compiler, rounds, duration)
     _show("Rigid-body terms, five joints", "ns", terms)
     single = _apart("single", compiler, rounds, duration)
     _show("One run of the closed loop", "ms per simulated second", single)
-    _compare(single, say)
     many = _apart("many", compiler, rounds, duration)
     _show("One of many runs, per core", "ms per simulated second", many)
-    _compare(many, say)
+    _show("Commands from start to end", "s of processor time", start_up(rounds=rounds))
+    _claims([*terms_shows(terms), *loop_shows("single", single), *loop_shows("many", many)])
     path = draw({"One run": single, "One of many": many}, terms, chosen.out)
-    say(f"picture: {path}")
+    CONSOLE.print(f"picture: {path}; load at the end {os.getloadavg()[0]:.1f}")
 
 
 def _apart(section: str, compiler: str, rounds: int, duration: float) -> list[Result]:
@@ -74,16 +75,21 @@ def _show(title: str, unit: str, results: Sequence[Result]) -> None:
     CONSOLE.print(table)
 
 
-def _compare(results: Sequence[Result], say) -> None:
-    """Peers against this package at each peer's own error, interpolated between settings."""
-    own = sorted((r.error, r.cost) for r in results if r.name.startswith("mrac_design"))
-    own = [p for p in own if not any(e <= p[0] and c < p[1] for e, c in own)]
-    errors, costs = (np.log([point[i] for point in own]) for i in (0, 1))
-    for result in results:
-        if result.name.startswith("mrac_design") or not result.error:
-            continue
-        equal = float(np.exp(np.interp(np.log(result.error), errors, costs)))
-        say(f"{result.name}: {result.cost / equal:.2f} × this package's time at equal error")
+def _claims(shows: Sequence[Show]) -> None:
+    table = Table(
+        "peer's time over this package's, at no larger error", "median (quartiles)", "wanted", "",
+        "this package's setting",
+        title="Claims",
+    )  # fmt: skip
+    for show in shows:
+        table.add_row(
+            show.claim,
+            str(show.ratio),
+            f"{'≤' if show.at_most else '≥'} {show.wanted:g}",
+            "holds" if show.holds else "FALLS SHORT",
+            show.setting,
+        )
+    CONSOLE.print(table)
 
 
 if __name__ == "__main__":

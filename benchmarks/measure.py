@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import math
+import os
 import platform
 import time
 from collections.abc import Callable, Mapping
@@ -11,15 +13,20 @@ from pathlib import Path
 
 import numpy as np
 
+from mrac_design.simulation.compilation import _version, find_compiler
 
-@dataclass(frozen=True, slots=True, kw_only=True)
+TURN = 4e-3
+"""Shortest turn (s): a call on cold caches says nothing about the next thousand."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class Result:
     """One contestant's figures."""
 
     name: str
     """Who, with what setting."""
-    cost: float
-    """Median processor time per unit of work."""
+    turns: np.ndarray
+    """Processor time per unit of work in each round."""
     error: float | None
     """Largest deviation from the reference solution; None where it does not apply."""
     setup: float
@@ -27,20 +34,52 @@ class Result:
     note: str = ""
     """What is not alike."""
 
+    @property
+    def cost(self) -> float:
+        """Median over the rounds."""
+        return float(np.median(self.turns))
+
+
+@dataclass(frozen=True, slots=True)
+class Ratio:
+    """How many times as long one takes as the other, by rounds."""
+
+    low: float
+    """First quartile."""
+    median: float
+    """Second quartile."""
+    high: float
+    """Third quartile."""
+
+    @classmethod
+    def of(cls, slow: Result, fast: Result) -> Ratio:
+        """Round by round, as both met the same machine then."""
+        low, median, high = np.quantile(slow.turns / fast.turns, (0.25, 0.5, 0.75))
+        return cls(float(low), float(median), float(high))
+
+    def __str__(self) -> str:
+        return f"{self.median:.3g} ({self.low:.3g} to {self.high:.3g})"
+
 
 def interleaved(
-    contestants: Mapping[str, Callable[[], object]], *, rounds: int
-) -> dict[str, float]:
-    """Median processor time (s) of each call; all take turns, so all meet the same machine."""
-    times: dict[str, list[float]] = {name: [] for name in contestants}
-    for call in contestants.values():
+    contestants: Mapping[str, Callable[[], object]], *, rounds: int, turn: float = TURN
+) -> dict[str, np.ndarray]:
+    """Processor time (s) of a call in each round; all take turns, so all meet the same machine."""
+    repeats = {}
+    for name, call in contestants.items():
         call()
+        begin = time.thread_time()
+        call()
+        repeats[name] = max(1, math.ceil(turn / max(time.thread_time() - begin, 1e-7)))
+    times: dict[str, list[float]] = {name: [] for name in contestants}
     for _ in range(rounds):
         for name, call in contestants.items():
-            begin = time.thread_time()
             call()
-            times[name].append(time.thread_time() - begin)
-    return {name: float(np.median(values)) for name, values in times.items()}
+            begin = time.thread_time()
+            for _ in range(repeats[name]):
+                call()
+            times[name].append((time.thread_time() - begin) / repeats[name])
+    return {name: np.array(values) for name, values in times.items()}
 
 
 def timed(build: Callable[[], object]) -> tuple[object, float]:
@@ -63,10 +102,6 @@ def machine() -> str:
         flags = ", ".join(flag for flag in sets if flag in fields.get("flags", "").split())
     except OSError:
         pass
-    import os
-
-    from mrac_design.simulation.compilation import _version, find_compiler
-
     compiler = find_compiler()
     packages = ", ".join(
         f"{package} {_installed(package)}"

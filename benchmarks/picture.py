@@ -22,7 +22,9 @@ def draw(loops: Mapping[str, Sequence[Result]], terms: Sequence[Result], out: Pa
             families.setdefault(result.name.split(",")[0], []).append(result)
         for family, members in families.items():
             points = sorted((r.cost, r.error) for r in members if r.error)
-            axis.loglog(*zip(*points, strict=True), "o-", label=family)
+            best = [p for p in points if not any(q[0] < p[0] and q[1] <= p[1] for q in points)]
+            (line,) = axis.loglog(*zip(*best, strict=True), "o-", label=family)
+            axis.loglog(*zip(*points, strict=True), ".", color=line.get_color())
         axis.set(title=title, xlabel="ms per simulated second", ylabel="largest force error (N)")
         axis.legend(fontsize=7)
         axis.grid(which="both", alpha=0.2)

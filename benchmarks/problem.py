@@ -2,15 +2,16 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass, replace
 
 import numpy as np
+from scipy.integrate import solve_ivp
 from scipy.interpolate import CubicSpline
 
 from mrac_design.codegen.reading import read_function
 from mrac_design.codegen.straight_line import StraightLine
-from mrac_design.controller.adaptive import build_step
-from mrac_design.controller.linearisation import RobotModelError, build_linearisation
+from mrac_design.controller.linearisation import RobotModelError
 from mrac_design.motion.signal import PiecewisePolynomial, from_ppoly, stack
 from mrac_design.robot import build_dynamics, load_robot
 from mrac_design.simulation.closed_loop import ForceLoop
@@ -19,13 +20,14 @@ from mrac_design.simulation.method import Method
 from mrac_design.simulation.run import RunSettings, run
 from mrac_design.simulation.scenario import load_scenario
 from mrac_design.simulation.scenario_run import ready_loop
-from mrac_design.simulation.system import HybridSystem
+from mrac_design.simulation.system import HybridSystem, Kinks
 from mrac_design.study import (
     VARIANTS,
     exogenous_inputs,
     scenario_design,
+    scenario_linearisation,
     scenario_motion,
-    variant_controller,
+    variant_step,
 )
 
 RECORD = 1e-3
@@ -71,6 +73,49 @@ class Problem:
         """Instants of the records (s)."""
         return np.arange(round(self.duration / RECORD)) * RECORD
 
+    def reference(self) -> np.ndarray:
+        """Forces (N) at the records by SciPy's DOP853 at 1e-12, restarted at every breakpoint."""
+        borders, rows, x = self.inputs.breakpoints, [], self.state
+        for index in range(self.inputs.segments):
+            start, end = borders[index], min(borders[index + 1], self.duration)
+            if start >= self.duration - 1e-12:
+                break
+            records = self.times[(self.times >= start - 1e-12) & (self.times < end - 1e-12)]
+            solved = solve_ivp(
+                self._derivative(index),
+                (0.0, end - start),
+                x,
+                method="DOP853",
+                t_eval=np.append(np.maximum(records - start, 0.0), end - start),
+                rtol=1e-12,
+                atol=1e-13,
+            )
+            rows.append(solved.y[:, :-1].T)
+            x = solved.y[:, -1]
+        return self.forces(np.vstack(rows))
+
+    def _derivative(self, index: int) -> Callable[[float, np.ndarray], np.ndarray]:
+        """Right-hand side over the time since the beginning of a segment of the inputs."""
+        buffer, evaluate = self.system.rate.buffer()
+        state, v, slope = np.array(self.state), np.zeros(self.inputs.channels), self.state * 0.0
+        # CasADi keeps addresses only: the function below keeps the arrays.
+        kept = {0: state, 2: v, 3: np.array(self.parameters)}
+        for number, values in kept.items():
+            buffer.set_arg(number, memoryview(values))
+        buffer.set_res(0, memoryview(slope))
+        powers = self.inputs.coefficients[:, index, ::-1].T
+
+        def derivative(t: float, x: np.ndarray) -> np.ndarray:
+            state[:] = x
+            v[:] = powers[0]
+            for coefficients in powers[1:]:
+                v[:] = v * t + coefficients
+            evaluate()
+            return np.array(slope)
+
+        derivative.kept = buffer, kept
+        return derivative
+
     def engine(self, method: Method, compiler: str) -> CompiledEngine:
         """This package's engine for it."""
         return CompiledEngine(
@@ -90,25 +135,22 @@ class Problem:
         return self.system.outputs.split(outputs)["force"]
 
 
-def five_joint_loop(duration: float) -> Problem:
-    """The nominal scenario with the first simulation's reference and a wrong robot model."""
+def five_joint_loop(duration: float, *, kinks: Kinks = Kinks.CROSSED) -> Problem:
+    """The nominal scenario with the first simulation's reference and a wrong robot model.
+
+    No peer ends its steps where an effort meets its limit; neither does this package then.
+    """
     scenario = load_scenario("nominal")
     wrong = RobotModelError(body_scale=1.05, first_joint_scale=1.25)
     scenario = replace(scenario, model_error=wrong)
     dynamics, design = build_dynamics(load_robot(scenario.robot)), scenario_design(scenario)
-    linearisation = build_linearisation(
-        dynamics,
-        velocity_gain=scenario.design.velocity_gain,
-        tool_axis_bandwidth=scenario.design.tool_axis_bandwidth,
-        model_error=wrong,
-    )
     inputs = _as_recorded(exogenous_inputs(scenario, dynamics, scenario_motion(scenario)))
     ready = ready_loop(
         scenario,
         dynamics,
-        linearisation,
-        build_step(variant_controller(scenario, design, VARIANTS[-1])),
-        force=inputs(0.0)[3:6, 0],
+        scenario_linearisation(scenario, dynamics),
+        variant_step(scenario, design, VARIANTS[-1]),
+        kinks=kinks,
     )
     return Problem(loop=ready.loop, state=np.array(ready.state), inputs=inputs, duration=duration)
 

@@ -151,10 +151,6 @@ class CompilationError(MracDesignError):
         super().__init__(f"'{' '.join(command)}' failed: {first}")
 
 
-class CodeGenerationError(MracDesignError):
-    """A system holds an operation that the chosen method or machine has no rule for."""
-
-
 class SimulationError(MracDesignError):
     """A simulation left the range of finite numbers."""
 
@@ -165,6 +161,10 @@ class RealtimeError(MracDesignError):
 
 class EnsembleError(MracDesignError):
     """An ensemble cannot start, go on from its store, or reach its cluster."""
+
+
+class TuningError(MracDesignError):
+    """No choice of the free variables meets the constraints."""
 
 
 class CertificateError(MracDesignError):

@@ -5,26 +5,29 @@ from __future__ import annotations
 import logging
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
-from pathlib import Path
 
 import numpy as np
 
-from mrac_design.arrays import readonly
 from mrac_design.controller.adaptive import AdaptiveRST, build_step, nominal_gains
-from mrac_design.controller.linearisation import build_linearisation, home_task_position
+from mrac_design.controller.linearisation import (
+    Linearisation,
+    build_linearisation,
+    home_task_position,
+)
 from mrac_design.controller.reference import DirectReference, ModelInverse, ReferenceFeedforward
+from mrac_design.controller.step import ControllerStep
 from mrac_design.design import RSTDesign, design_rst
 from mrac_design.errors import ScenarioFileError
 from mrac_design.metrics.tracking import TrackingMetrics, max_torque, tracking_metrics
-from mrac_design.motion import HeartMotion, available_motions, load_motion, read_recorded_motion
+from mrac_design.motion import HeartMotion, load_motion, names_model, read_recorded_motion
 from mrac_design.motion.signal import PiecewisePolynomial
 from mrac_design.plant import ForcePlant
 from mrac_design.robot import RobotDescription, RobotDynamics, build_dynamics, load_robot
 from mrac_design.robot.posture import check_posture, condition_numbers
-from mrac_design.simulation.engine import Engine
 from mrac_design.simulation.run import Progress
 from mrac_design.simulation.scenario import Scenario
-from mrac_design.simulation.scenario_run import ready_loop, scenario_inputs, simulate
+from mrac_design.simulation.scenario_inputs import scenario_inputs
+from mrac_design.simulation.scenario_run import ready_loop, simulate_side_by_side
 from mrac_design.simulation.trajectory import Trajectory
 from mrac_design.time_domain import Continuous, TimeDomain
 
@@ -82,8 +85,7 @@ def run_study(scenario: Scenario, progress: Progress | None = None) -> StudyReco
 
     Raises the package's errors for anything in the scenario that cannot be.
     """
-    robot = load_robot(scenario.robot)
-    _check_axes(scenario, robot)
+    robot = scenario_robot(scenario)
     motion = scenario_motion(scenario)
     design = scenario_design(scenario)
     dynamics = build_dynamics(robot)
@@ -108,17 +110,32 @@ def run_study(scenario: Scenario, progress: Progress | None = None) -> StudyReco
 
 def check_scenario(scenario: Scenario) -> None:
     """Raise what `run_study` would raise for the scenario's files and numbers, without running."""
-    robot = load_robot(scenario.robot)
-    _check_axes(scenario, robot)
+    robot = scenario_robot(scenario)
     scenario_motion(scenario)
     scenario_design(scenario)
     check_posture(build_dynamics(robot), robot.home, scenario.simulation.condition_limit)
 
 
+def scenario_robot(scenario: Scenario) -> RobotDescription:
+    """The scenario's robot.
+
+    Raises ScenarioFileError when the force reference has other axes than the robot.
+    """
+    robot = load_robot(scenario.robot)
+    wanted, given = len(robot.force_axes), len(scenario.reference.steps)
+    if wanted != given:
+        raise ScenarioFileError(
+            scenario.name,
+            "reference",
+            f"{given} axes given, but {robot.name} controls force on {', '.join(robot.force_axes)}",
+        )
+    return robot
+
+
 def scenario_motion(scenario: Scenario) -> HeartMotion:
     """The scenario's heart motion, long enough for its run."""
     choice = scenario.motion
-    if choice.source in available_motions() or Path(choice.source).suffix == ".toml":
+    if names_model(choice.source):
         return load_motion(choice.source, duration=scenario.simulation.duration)
     return read_recorded_motion(
         choice.source,
@@ -149,6 +166,22 @@ def variant_controller(scenario: Scenario, design: RSTDesign, variant: Variant) 
     )
 
 
+def variant_step(scenario: Scenario, design: RSTDesign, variant: Variant) -> ControllerStep:
+    """The axis controller of a variant in the scenario's time domain."""
+    controller = variant_controller(scenario, design, variant)
+    return build_step(replace(controller, time_domain=controller_domain(scenario)))
+
+
+def scenario_linearisation(scenario: Scenario, dynamics: RobotDynamics) -> Linearisation:
+    """The scenario's linearising torque, with its model error."""
+    return build_linearisation(
+        dynamics,
+        velocity_gain=scenario.design.velocity_gain,
+        tool_axis_bandwidth=scenario.design.tool_axis_bandwidth,
+        model_error=scenario.model_error,
+    )
+
+
 def simulate_variants(
     scenario: Scenario,
     dynamics: RobotDynamics,
@@ -159,30 +192,14 @@ def simulate_variants(
     progress: Progress | None = None,
 ) -> Mapping[str, Trajectory]:
     """Run every variant from rest on the heart; one engine serves all, parameters differ."""
-    linearisation = build_linearisation(
-        dynamics,
-        velocity_gain=scenario.design.velocity_gain,
-        tool_axis_bandwidth=scenario.design.tool_axis_bandwidth,
-        model_error=scenario.model_error,
-    )
+    linearisation = scenario_linearisation(scenario, dynamics)
     inputs = exogenous_inputs(scenario, dynamics, motion)
-    axes = len(dynamics.description.force_axes)
-    engine: Engine | None = None
-    trajectories = {}
-    for number, variant in enumerate(variants):
-        controller = variant_controller(scenario, design, variant)
-        ready = ready_loop(
-            scenario,
-            dynamics,
-            linearisation,
-            build_step(replace(controller, time_domain=controller_domain(scenario))),
-            force=readonly(inputs(0.0)[axes : 2 * axes, 0]),
-        )
-        share = None if progress is None else _share(progress, number, len(variants))
-        trajectories[variant.name], engine = simulate(
-            scenario, ready, inputs, engine=engine, progress=share
-        )
-    return trajectories
+    loops = [
+        ready_loop(scenario, dynamics, linearisation, variant_step(scenario, design, variant))
+        for variant in variants
+    ]
+    runs = simulate_side_by_side(scenario, loops, inputs, progress=progress)
+    return dict(zip((variant.name for variant in variants), runs, strict=True))
 
 
 def controller_domain(scenario: Scenario) -> TimeDomain:
@@ -194,30 +211,10 @@ def controller_domain(scenario: Scenario) -> TimeDomain:
 def exogenous_inputs(
     scenario: Scenario, dynamics: RobotDynamics, motion: HeartMotion
 ) -> PiecewisePolynomial:
-    """Heart position (m), force reference (N), k channels each, and what else the loop takes.
-
-    The heart lies where the tissue carries the first reference when the tip is at home, so the
-    run starts in equilibrium but for the heart's velocity.
-    """
-    duration = scenario.simulation.duration
+    """Inputs of the scenario's loop on its robot, see `scenario_inputs`."""
     axes = dynamics.description.task.position
-    reference = scenario.reference.piecewise(duration)
-    displacement = motion.displacement.restricted(0.0, duration).selected(axes)
     tip = home_task_position(dynamics)[: len(axes)]
-    start = displacement(0.0)[:, 0]
-    contact = scenario.contact.build(scenario.stiffness)
-    rest = tip - contact.rest_depth(reference(0.0)[:, 0])
-    return scenario_inputs(scenario, displacement.shifted(rest - start), reference)
-
-
-def _check_axes(scenario: Scenario, robot: RobotDescription) -> None:
-    wanted, given = len(robot.force_axes), len(scenario.reference.steps)
-    if wanted != given:
-        raise ScenarioFileError(
-            scenario.name,
-            "reference",
-            f"{given} axes given, but {robot.name} controls force on {', '.join(robot.force_axes)}",
-        )
+    return scenario_inputs(scenario, motion, axes=axes, tip=tip)
 
 
 def _worst_condition(
@@ -234,7 +231,3 @@ def _worst_condition(
             scenario.simulation.condition_limit,
         )
     return worst
-
-
-def _share(progress: Progress, number: int, count: int) -> Progress:
-    return lambda fraction: progress((number + fraction) / count)

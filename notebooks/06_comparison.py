@@ -82,10 +82,10 @@ Friction and errors of the robot's model are left out here: they are alike for a
 # A tuning is admissible when one more sample of dead time, which no law knows of, does not more
 # than double that error: simulated, so the rule is the same for linear and for adaptive laws. A
 # global search (differential evolution) spends half of the evaluations, a simplex search the rest.
-# Laws that take the heart rate as known are told it, motion by motion; the one that needs an ECG
-# gets the instants of the beats. PI with learning is made for a fast inner velocity loop and may
-# choose its $K_2$. The motion predictor's repetition over a whole breath would need thousands of
-# registers at this rate; there, breathing is left to its slow disturbance. The certified
+# Laws that take heart or breathing rate as known are told it, motion by motion; the one that needs
+# an ECG gets the instants of the beats. PI with learning is made for a fast inner velocity loop and
+# may choose its $K_2$. The motion predictor's repetition over a whole breath would need thousands
+# of registers at this rate; its internal model keeps the breath's first two harmonics. Certified
 # controllers must show, for every tuning that would become their best, a Lyapunov function common
 # to all gains in their box and all stiffnesses up to 1.5 times the design's, checked in exact
 # arithmetic; bias and harmonics enter as bounded inputs.

@@ -16,8 +16,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-import typer
-from typer.testing import CliRunner
+from click.testing import CliRunner
 
 from mrac_design.cli import ensemble as cli_ensemble
 from mrac_design.ensemble_study import EnsembleChoice, prepare_ensemble, run_prepared
@@ -39,16 +38,11 @@ from mrac_design.study import run_study
 pytestmark = pytest.mark.skipif(find_compiler() is None, reason="no C compiler here")
 
 ROOT = Path(__file__).parents[1]
-APP = typer.Typer()
-APP.command()(cli_ensemble.ensemble)
 SMALL_CHUNKS = (
-    "import typer\n"
-    "import mrac_design.ensemble_study as study\n"
+    "import mrac_design.ensemble_study.preparation as study\n"
     "from mrac_design.cli.ensemble import ensemble\n"
     "study._LARGEST_CHUNK = 8\n"
-    "app = typer.Typer()\n"
-    "app.command()(ensemble)\n"
-    "app()\n"
+    "ensemble()\n"
 )
 """Many pieces of little work, so that a stop finds some of them finished."""
 
@@ -85,7 +79,7 @@ def unillustrated(monkeypatch):
 
 
 def run(*words: str, status: int = 0) -> str:
-    result = CliRunner().invoke(APP, words, catch_exceptions=False)
+    result = CliRunner().invoke(cli_ensemble.ensemble, words, catch_exceptions=False)
     assert result.exit_code == status, result.output
     return result.stdout if status == 0 else result.output
 
@@ -190,7 +184,7 @@ def test_motion_seeds_give_motions_and_noise_of_their_own():
 
 
 def test_killed_command_goes_on_where_it_was(path, tmp_path, monkeypatch, unillustrated):
-    monkeypatch.setattr("mrac_design.ensemble_study._LARGEST_CHUNK", 8)
+    monkeypatch.setattr("mrac_design.ensemble_study.preparation._LARGEST_CHUNK", 8)
     words = ("-s", path, "--duration", "1", "-n", "400", "--workers", "1")
     store = tmp_path / "store"
     process = subprocess.Popen(
@@ -213,7 +207,7 @@ def test_killed_command_goes_on_where_it_was(path, tmp_path, monkeypatch, unillu
 
 
 def test_interrupted_command_says_how_to_go_on(path, tmp_path, monkeypatch):
-    monkeypatch.setattr("mrac_design.ensemble_study._LARGEST_CHUNK", 8)
+    monkeypatch.setattr("mrac_design.ensemble_study.preparation._LARGEST_CHUNK", 8)
 
     class Impatient:
         def __init__(self, count):

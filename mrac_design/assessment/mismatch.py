@@ -26,7 +26,7 @@ from mrac_design.robot import (
     inertial_parameters,
     scaled_parameters,
 )
-from mrac_design.robot.description import JointType
+from mrac_design.robot.parts import JointType
 from mrac_design.robot.posture import condition_numbers
 
 

@@ -29,10 +29,10 @@ OPERATORS = {
     ca.OP_NOT: "real_where({0} == 0.0)",
     ca.OP_IF_ELSE_ZERO: "real_if({0} != 0.0, {1})",
     ca.OP_SIGN: "real_where({0} > 0.0) - real_where({0} < 0.0)",
-    ca.OP_FABS: "real_max({0}, -{0})",
+    ca.OP_FABS: "real_abs({0})",
     FMA: "real_fma({0}, {1}, {2})",
-    FMS: "real_fma({0}, {1}, -{2})",
-    FNMA: "real_fma(-{0}, {1}, {2})",
+    FMS: "real_fms({0}, {1}, {2})",
+    FNMA: "real_fnma({0}, {1}, {2})",
 }
 _MIX = (ca.OP_ADD, ca.OP_SUB, ca.OP_MUL, ca.OP_DIV, ca.OP_NEG)
 """Operators that take a vector and a number."""
@@ -52,6 +52,7 @@ typedef double real;
 #define real_where(condition) ((double)(condition))
 #define real_if(condition, a) ((condition) ? (a) : 0.0)
 #define real_any(condition) (condition)
+#define real_abs(a) __builtin_fabs(a)
 #define real_call1(function, a) function(a)
 #define real_call2(function, a, b) function(a, b)
 #if defined(__FMA__) || defined(__ARM_FEATURE_FMA)
@@ -59,6 +60,8 @@ static inline double real_fma(double a, double b, double c) { return __builtin_f
 #else
 static inline double real_fma(double a, double b, double c) { return a * b + c; }
 #endif
+static inline double real_fms(double a, double b, double c) { return real_fma(a, b, -c); }
+static inline double real_fnma(double a, double b, double c) { return real_fma(-a, b, c); }
 static inline double real_min(double a, double b) { return a < b ? a : b; }
 static inline double real_max(double a, double b) { return a > b ? a : b; }
 """
@@ -71,6 +74,7 @@ typedef long long mask __attribute__((vector_size(LANES * sizeof(double))));
 #define splat(x) ((real){0.0} + (x))
 static inline real real_where(mask c) { return (real)(c & (mask)splat(1.0)); }
 static inline real real_if(mask c, real a) { return (real)(c & (mask)a); }
+static inline real real_abs(real a) { return (real)((mask)a & 0x7fffffffffffffffLL); }
 static inline real real_min(real a, real b) {
     const mask c = a < b;
     return (real)((c & (mask)a) | (~c & (mask)b));
@@ -82,6 +86,12 @@ static inline real real_max(real a, real b) {
 #if defined(__AVX512F__)
 static inline real real_fma(real a, real b, real c) {
     return (real)_mm512_fmadd_pd((__m512d)a, (__m512d)b, (__m512d)c);
+}
+static inline real real_fms(real a, real b, real c) {
+    return (real)_mm512_fmsub_pd((__m512d)a, (__m512d)b, (__m512d)c);
+}
+static inline real real_fnma(real a, real b, real c) {
+    return (real)_mm512_fnmadd_pd((__m512d)a, (__m512d)b, (__m512d)c);
 }
 #elif defined(__AVX2__) && defined(__FMA__)
 static inline real real_fma(real a, real b, real c) {
@@ -98,6 +108,10 @@ static inline real real_fma(real a, real b, real c) {
 }
 #else
 static inline real real_fma(real a, real b, real c) { return a * b + c; }
+#endif
+#if !defined(__AVX512F__)
+static inline real real_fms(real a, real b, real c) { return real_fma(a, b, -c); }
+static inline real real_fnma(real a, real b, real c) { return real_fma(-a, b, c); }
 #endif
 static inline int real_any(mask c) {
     long long any = 0;
@@ -129,14 +143,30 @@ def c_routine(program: StraightLine, name: str, *, inputs: Sequence[str] | None 
     `inputs` names those to keep, where the others are not used.
     """
     kept = [n for n, _ in program.inputs] if inputs is None else inputs
+    return c_function_text(name, kept, program.outputs, _statements(program))
+
+
+def c_function_text(
+    name: str,
+    inputs: Sequence[str],
+    outputs: Sequence[tuple[str, tuple[int, ...]]],
+    statements: Sequence[str],
+) -> str:
+    """A static function on `real` of those statements."""
     pointers = [
-        *(f"const real *restrict {argument}" for argument in kept),
-        *(f"real *restrict {result}" for result, _ in program.outputs),
+        *(f"const real *restrict {argument}" for argument in inputs),
+        *(f"real *restrict {result}" for result, _ in outputs),
     ]
-    names = [*kept, *(n for n, _ in program.outputs)]
-    unused = " ".join(f"(void){n};" for n in names)
-    body = "\n".join(f"    {line}" for line in _statements(program))
+    unused = " ".join(f"(void){n};" for n in (*inputs, *(n for n, _ in outputs)))
+    body = "\n".join(f"    {line}" for line in statements)
     return f"static void {name}({', '.join(pointers)})\n{{\n    {unused}\n{body}\n}}\n"
+
+
+def operation_text(operation: int, operands: Sequence[str]) -> str:
+    """The C expression of an operation."""
+    if operation in FUNCTIONS:
+        return f"real_call{len(operands)}({FUNCTIONS[operation]}, {', '.join(operands)})"
+    return OPERATORS[operation].format(*operands)
 
 
 def literal(value: float) -> str:
@@ -164,11 +194,7 @@ def _statements(program: StraightLine) -> list[str]:
                 f"splat({operand})" if program.nodes[j].operation == CONSTANT else operand
                 for operand, j in zip(operands, arguments, strict=True)
             ]
-        if operation in FUNCTIONS:
-            text = f"real_call{len(operands)}({FUNCTIONS[operation]}, {', '.join(operands)})"
-        else:
-            text = OPERATORS[operation].format(*operands)
-        lines.append(f"const real w{i} = {text};")
+        lines.append(f"const real w{i} = {operation_text(operation, operands)};")
         shown.append(f"w{i}")
     for name, entries in program.outputs:
         lines += [

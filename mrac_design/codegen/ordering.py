@@ -9,14 +9,24 @@ Graham 1969); what is of equal urgency stays together, so that few values are ke
 from __future__ import annotations
 
 import heapq
+from collections.abc import Sequence
+from typing import Protocol
 
 import casadi as ca
 
-from mrac_design.codegen.straight_line import CONSTANT, INPUT, Node, StraightLine
+from mrac_design.codegen.straight_line import (
+    CONSTANT,
+    GATHER,
+    INPUT,
+    LANE,
+    LOAD,
+    Node,
+    StraightLine,
+)
 
 _WIDTH = 3
 """Operations begun in a cycle."""
-_LATENCY = {ca.OP_DIV: 13, ca.OP_SQRT: 20, ca.OP_NEG: 0}
+_LATENCY = {ca.OP_DIV: 13, ca.OP_SQRT: 20, ca.OP_NEG: 0, GATHER: 5, LANE: 3}
 _USUAL_LATENCY = 4
 _LOCALITY = 0.03
 """Urgency (cycles) lost per place in the given order."""
@@ -24,13 +34,30 @@ _LARGEST = 6000
 """Operations of the largest program worth ordering; larger ones are bound by memory."""
 
 
+class Operation(Protocol):
+    """A value of a program as far as its order goes."""
+
+    @property
+    def operation(self) -> int:
+        """Number of the operation."""
+
+    @property
+    def arguments(self) -> tuple[int, ...]:
+        """Positions of the operands, except of inputs."""
+
+
 def ordered(program: StraightLine) -> StraightLine:
     """The same operations in an order that keeps a processor busy."""
-    count = len(program.nodes)
-    if count > _LARGEST:
+    if len(program.nodes) > _LARGEST:
         return program
-    operands = [() if n.operation == INPUT else tuple(set(n.arguments)) for n in program.nodes]
-    latency = [_latency(node) for node in program.nodes]
+    return _renumbered(program, start_order(program.nodes))
+
+
+def start_order(nodes: Sequence[Operation]) -> list[int]:
+    """Positions in the order in which their operations are to be begun."""
+    count = len(nodes)
+    operands = [() if n.operation in (INPUT, LOAD) else tuple(set(n.arguments)) for n in nodes]
+    latency = [_latency(node) for node in nodes]
     urgency = _urgency(operands, latency)
     followers: list[list[int]] = [[] for _ in range(count)]
     for i, needed in enumerate(operands):
@@ -59,11 +86,11 @@ def ordered(program: StraightLine) -> StraightLine:
                 _, i = heapq.heappop(waiting)
                 heapq.heappush(ready, (-urgency[i] + _LOCALITY * i, i))
         cycle += 1
-    return _renumbered(program, order)
+    return order
 
 
-def _latency(node: Node) -> int:
-    if node.operation in (INPUT, CONSTANT):
+def _latency(node: Operation) -> int:
+    if node.operation in (INPUT, LOAD, CONSTANT):
         return 0
     return _LATENCY.get(node.operation, _USUAL_LATENCY)
 

@@ -17,14 +17,19 @@ from mrac_design.codegen.straight_line import (
     StraightLine,
 )
 
+_LEAD = 3
+"""Operations a divisor has to be ahead of its dividend so that nothing waits for a division."""
+
 
 def share_reciprocals(program: StraightLine, *, settled: Collection[str] = ()) -> StraightLine:
     """Quotients by the same divisor as products with its reciprocal, made once.
 
     So are quotients by what depends on the inputs `settled` alone, whose reciprocal
-    `hoist_settled` then moves out of the loop. Changes results in the last place.
+    `hoist_settled` then moves out of the loop, and quotients whose divisor is known long before
+    the dividend. Changes results in the last place.
     """
     constant = _settled_positions(program, settled)
+    depth = _depths(program)
     uses = Counter(node.arguments[1] for node in program.nodes if node.operation == ca.OP_DIV)
     builder = Builder()
     inputs = [builder.input(name, length) for name, length in program.inputs]
@@ -34,7 +39,11 @@ def share_reciprocals(program: StraightLine, *, settled: Collection[str] = ()) -
             place.append(inputs[arguments[0]][arguments[1]])
         elif operation == CONSTANT:
             place.append(builder.constant(value))
-        elif operation == ca.OP_DIV and (uses[arguments[1]] > 1 or arguments[1] in constant):
+        elif operation == ca.OP_DIV and (
+            uses[arguments[1]] > 1
+            or arguments[1] in constant
+            or depth[arguments[1]] + _LEAD <= depth[arguments[0]]
+        ):
             reciprocal = builder.divide(builder.constant(1.0), place[arguments[1]])
             place.append(builder.multiply(place[arguments[0]], reciprocal))
         else:
@@ -118,6 +127,15 @@ def _copy(program: StraightLine, *, ready: list[int] | None) -> tuple[list[int],
         else:
             place.append(builder.apply(operation, *(place[j] for j in arguments)))
     return place, builder
+
+
+def _depths(program: StraightLine) -> list[int]:
+    """Length of the longest chain of operations that ends at each value."""
+    depth: list[int] = []
+    for operation, arguments, _ in program.nodes:
+        known = operation in (INPUT, CONSTANT)
+        depth.append(0 if known else 1 + max(depth[j] for j in arguments))
+    return depth
 
 
 def _settled_positions(program: StraightLine, settled: Collection[str]) -> set[int]:

@@ -12,6 +12,8 @@ import casadi as ca
 INPUT, CONSTANT = ca.OP_INPUT, ca.OP_CONST
 FMA, FMS, FNMA = 1001, 1002, 1003
 """a b + c, a b − c and c − a b rounded once; CasADi has no numbers for them."""
+GATHER, LANE, LOAD = 1004, 1005, 1006
+"""Of packed programs: a vector of four numbers, a number of a vector, four entries of an input."""
 _FREE = (INPUT, CONSTANT, ca.OP_OUTPUT, ca.OP_NEG, ca.OP_ASSIGN)
 _SUMS = (ca.OP_ADD, ca.OP_SUB, ca.OP_TWICE)
 _FUSED = (FMA, FMS, FNMA)
@@ -127,10 +129,6 @@ class Builder:
         node = self._nodes[position]
         return node.value if node.operation == CONSTANT else None
 
-    def node(self, position: int) -> Node:
-        """What stands at a position."""
-        return self._nodes[position]
-
     def apply(self, operation: int, *arguments: int) -> int:
         """Position of an operation's result."""
         rewrite = _REWRITES.get(operation)
@@ -157,15 +155,6 @@ class Builder:
     def divide(self, a: int, b: int) -> int:
         """a / b."""
         return self.apply(ca.OP_DIV, a, b)
-
-    def total(self, terms: Sequence[int]) -> int:
-        """Sum of the terms from the left; zero for none."""
-        if not terms:
-            return self.constant(0.0)
-        result = terms[0]
-        for term in terms[1:]:
-            result = self.add(result, term)
-        return result
 
     def finish(self, outputs: Mapping[str, Sequence[int]]) -> StraightLine:
         """The program that computes `outputs`, without anything they do not need."""

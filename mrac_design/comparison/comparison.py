@@ -23,7 +23,7 @@ from mrac_design.comparison.judging import judge
 from mrac_design.comparison.limit import LinearLimit, linear_front, linear_limit, motion_spectrum
 from mrac_design.comparison.rival_contestants import rival_contestants
 from mrac_design.comparison.rst_contestants import STIFFEST_FACTOR, rst_contestants
-from mrac_design.comparison.setting import AxisSetting
+from mrac_design.comparison.setting import AxisSetting, Periods
 from mrac_design.comparison.store import ComparisonStore, Entry
 from mrac_design.comparison.tuning import tune
 from mrac_design.design import ReferenceModel
@@ -355,7 +355,7 @@ def load_specification(path: Path) -> ComparisonSpecification:
 
 def _law_hash(contestant: Contestant, setting: AxisSetting) -> str:
     """A hash of the contestant's equations and of its numbers at the start of the search."""
-    step = contestant.build(setting, 1.0, contestant.start).step
+    step = contestant.build(setting, Periods(beat=1.0, breath=5.0), contestant.start).step
     equations = (step.command.serialize() + step.advance.serialize()).encode()
     return hashlib.sha256(equations + step.parameter_values.tobytes()).hexdigest()
 

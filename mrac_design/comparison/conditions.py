@@ -10,7 +10,7 @@ import numpy as np
 
 from mrac_design.arrays import FloatArray, readonly
 from mrac_design.comparison.limit import MotionSpectrum, motion_spectrum
-from mrac_design.comparison.setting import AxisSetting, Condition
+from mrac_design.comparison.setting import AxisSetting, Condition, Periods
 from mrac_design.motion import (
     AXES,
     PiecewisePolynomial,
@@ -23,6 +23,7 @@ from mrac_design.motion import (
 )
 from mrac_design.motion.beats import find_beats
 from mrac_design.motion.dual_fourier import DualFourierModel
+from mrac_design.motion.fit_series import Recording, breathing_frequency
 from mrac_design.simulation.scenario import MotionChoice
 
 TRAINING_SHARE = 0.8
@@ -76,7 +77,7 @@ def condition_set(
         stiffness_factor=stiffness_factor,
     )
     spectrum = motion_spectrum(training.heart, end=training.duration, period=setting.period)
-    random = _random(spectrum, training.beat_period)
+    random = _random(spectrum, training.periods)
     strangers = _strangers(channel)[:stranger_count]
     return ConditionSet(
         training=training, judged=(held_back, stiffer, *strangers, random), spectrum=spectrum
@@ -87,7 +88,7 @@ def _recorded(motion: MotionChoice, channel: int) -> tuple[Condition, Condition]
     recording = read_recorded_motion(
         motion.source, point=motion.point, frame_rate=motion.frame_rate, cutoff=motion.cutoff
     )
-    onsets, period = _measured_beats(recording.displacement, motion.frame_rate)
+    onsets, periods = _measured_rhythms(recording.displacement, motion.frame_rate)
     heart = recording.displacement.selected([channel])
     frames = round(heart.end * motion.frame_rate) + 1
     border = round(TRAINING_SHARE * frames) / motion.frame_rate
@@ -97,7 +98,7 @@ def _recorded(motion: MotionChoice, channel: int) -> tuple[Condition, Condition]
         heart=heart.restricted(0.0, border),
         reference=_steps(border),
         beats=onsets,
-        beat_period=period,
+        periods=periods,
         stiffness_factor=1.0,
         settling=SETTLING,
     )
@@ -112,10 +113,10 @@ def _recorded(motion: MotionChoice, channel: int) -> tuple[Condition, Condition]
     return base, held_back
 
 
-def _measured_beats(
+def _measured_rhythms(
     displacement: PiecewisePolynomial, frame_rate: float
-) -> tuple[FloatArray, float]:
-    """Instants of the beats and their usual length (s), found in the motion without breathing."""
+) -> tuple[FloatArray, Periods]:
+    """Instants of the beats (s), found in the motion without breathing, and both usual periods."""
     from scipy.signal import butter, filtfilt
 
     frames = int(np.floor(displacement.end * frame_rate + 1e-9)) + 1
@@ -127,7 +128,10 @@ def _measured_beats(
         training=round(TRAINING_SHARE * frames),
     )
     training = beats.onsets[beats.onsets < TRAINING_SHARE * displacement.end]
-    return beats.onsets, float(np.diff(training).mean())
+    breath = breathing_frequency(
+        Recording(position=position, frame_rate=frame_rate, training=round(TRAINING_SHARE * frames))
+    )
+    return beats.onsets, Periods(beat=float(np.diff(training).mean()), breath=1.0 / breath)
 
 
 def _generated(model: DualFourierModel, channel: int) -> tuple[Condition, Condition]:
@@ -163,13 +167,13 @@ def _from_model(model: DualFourierModel, channel: int, name: str, title: str) ->
         heart=model.motion(MODEL_DURATION).displacement.selected([channel]),
         reference=_steps(MODEL_DURATION),
         beats=model.onsets(MODEL_DURATION),
-        beat_period=model.rhythm.mean_period,
+        periods=Periods(beat=model.rhythm.mean_period, breath=1.0 / model.breathing.frequency),
         stiffness_factor=1.0,
         settling=SETTLING,
     )
 
 
-def _random(spectrum: MotionSpectrum, beat_period: float) -> Condition:
+def _random(spectrum: MotionSpectrum, periods: Periods) -> Condition:
     """A Gaussian motion of the training motion's spectrum, under a constant force: exactly what
     the limit is computed for."""
     nodes = readonly(np.arange(round(MODEL_DURATION / _NODES) + 1) * _NODES)
@@ -179,8 +183,8 @@ def _random(spectrum: MotionSpectrum, beat_period: float) -> Condition:
         title="random motion of the tuned motion's spectrum, constant force",
         heart=quintic_hermite(nodes, value[None], rate[None], second[None]),
         reference=constant_force(LOWEST_FORCE).piecewise(MODEL_DURATION),
-        beats=np.arange(0.0, MODEL_DURATION, beat_period),
-        beat_period=beat_period,
+        beats=np.arange(0.0, MODEL_DURATION, periods.beat),
+        periods=periods,
         stiffness_factor=1.0,
         settling=SETTLING,
     )

@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from mrac_design.arrays import FloatArray, readonly
-from mrac_design.comparison.setting import AxisSetting
+from mrac_design.comparison.setting import AxisSetting, Periods
 from mrac_design.controller.step import ControllerStep
 from mrac_design.errors import ParameterError
 
@@ -77,8 +77,8 @@ class TunedAxis:
     """K2 (1/s)."""
 
 
-Build = Callable[[AxisSetting, float, FloatArray], TunedAxis]
-"""(setting, usual beat s, tuning vector) → controller; raises the package's errors."""
+Build = Callable[[AxisSetting, Periods, FloatArray], TunedAxis]
+"""(setting, usual beat and breath, tuning vector) → controller; raises the package's errors."""
 Proof = Callable[[AxisSetting, FloatArray], bool]
 """(setting, tuning vector) → whether the proof the contestant claims was found."""
 

@@ -92,13 +92,13 @@ def judge(
 ) -> Judgement:
     """Run a tuned contestant under every condition with `seeds` draws of noise, at least 2.
 
-    Laws that take the usual beat as known are told each condition's own.
+    Laws that take usual beat and breath as known are told each condition's own.
     """
     setting = bench.setting
     measured: dict[str, Measured] = {}
     noisy: FloatArray | None = None
     for number, condition in enumerate(conditions):
-        axis = contestant.build(setting, condition.beat_period, values)
+        axis = contestant.build(setting, condition.periods, values)
         rms, largest = np.full((2, seeds), np.inf)
         for run in range(seeds):
             sensing = Sensing.of(setting, FIRST_SEED + run)
@@ -114,7 +114,7 @@ def judge(
             progress((number + 1) / len(conditions))
     motion_error, amplification = math.inf, math.inf
     if noisy is not None:
-        axis = contestant.build(setting, conditions[0].beat_period, values)
+        axis = contestant.build(setting, conditions[0].periods, values)
         clean = bench.force_error(axis, conditions[0], Sensing.perfect())
         motion_error = root_mean_square(clean)
         # The same motion with and without noise: what differs is the noise's doing.

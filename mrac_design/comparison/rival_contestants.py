@@ -12,7 +12,7 @@ from mrac_design.comparison.contestant import (
     TunedAxis,
     TuningParameter,
 )
-from mrac_design.comparison.setting import AxisSetting
+from mrac_design.comparison.setting import AxisSetting, Periods
 from mrac_design.controller.reference import LeadingInverse
 from mrac_design.controller.rivals.active_observer import (
     ActiveObserver,
@@ -20,7 +20,7 @@ from mrac_design.controller.rivals.active_observer import (
     active_observer,
 )
 from mrac_design.controller.rivals.beat_preview import BeatPreview, beat_preview_step
-from mrac_design.controller.rivals.harmonics import BeatObserver
+from mrac_design.controller.rivals.harmonics import Rhythm, RhythmObserver
 from mrac_design.controller.rivals.learning import IterativeLearning, iterative_learning
 from mrac_design.controller.rivals.linear import LinearController, build_linear_step
 from mrac_design.controller.rivals.prediction import Horizon
@@ -33,7 +33,7 @@ from mrac_design.controller.rivals.predictive_observer import (
 LEADS = (10, 20, 40)
 """Leads δ the learning law may choose from (samples): every one is a program of its own."""
 _LEARNING_REACH = 100
-_BEAT_HARMONICS = 5
+_BEAT_HARMONICS, _BREATH_HARMONICS = 5, 2
 _CHANGE = 0.03  # s
 _PREVIEW, _CELL, _LONGEST_BEAT = 8, 0.02, 2.0
 
@@ -81,6 +81,7 @@ def rival_contestants() -> tuple[Contestant, ...]:
                 SECOND_POLE,
                 TuningParameter(name="beat drive", unit="N", low=1e-6, high=0.1, start=1e-4),
                 TuningParameter(name="slow drive", unit="m/s²", low=1e-4, high=3.0, start=0.01),
+                TuningParameter(name="breath drive", unit="N", low=1e-6, high=0.1, start=1e-4),
             ),
             _gpc,
             periodic=True,
@@ -149,7 +150,7 @@ _LEARNING = (
 )
 
 
-def _learning(setting: AxisSetting, beat: float, values: FloatArray) -> TunedAxis:
+def _learning(setting: AxisSetting, periods: Periods, values: FloatArray) -> TunedAxis:
     proportional, integral, learning, cutoff, lead, velocity_gain = map(float, values)
     controller = iterative_learning(
         IterativeLearning(
@@ -157,7 +158,7 @@ def _learning(setting: AxisSetting, beat: float, values: FloatArray) -> TunedAxi
             integral=integral,
             learning=learning,
             lead=min(LEADS, key=lambda choice: abs(choice / lead - 1.0)),
-            repetition=round(beat / setting.period),
+            repetition=round(periods.beat / setting.period),
             cutoff=cutoff,
             half_width=_LEARNING_REACH,
             prefilter=setting.prefilter,
@@ -198,20 +199,20 @@ def _active(
     return _axis(setting, controller)
 
 
-def _observer(setting: AxisSetting, beat: float, values: FloatArray) -> TunedAxis:
+def _observer(setting: AxisSetting, periods: Periods, values: FloatArray) -> TunedAxis:
     return _active(
         setting, _tuning(setting, 1, float(values[0]), float(values[1])), None, float(values[2])
     )
 
 
-def _observer_2(setting: AxisSetting, beat: float, values: FloatArray) -> TunedAxis:
+def _observer_2(setting: AxisSetting, periods: Periods, values: FloatArray) -> TunedAxis:
     # The second difference of a smooth motion is smaller than the first by about the time
     # over which it changes, so one range of drives serves both orders.
     drive = float(values[1]) * setting.period / _CHANGE
     return _active(setting, _tuning(setting, 2, float(values[0]), drive), None, float(values[2]))
 
 
-def _observers(setting: AxisSetting, beat: float, values: FloatArray) -> TunedAxis:
+def _observers(setting: AxisSetting, periods: Periods, values: FloatArray) -> TunedAxis:
     inner = _tuning(setting, 1, float(values[0]), float(values[1]))
     outer = _tuning(setting, 1, float(values[2]), float(values[3]))
     return _active(setting, inner, outer, float(values[4]))
@@ -222,14 +223,16 @@ def _horizon(first: int, last: float, moves: float, penalty: float) -> Horizon:
     return Horizon(first=first, last=end, moves=min(round(moves), end), penalty=penalty)
 
 
-def _receding(setting: AxisSetting, values: FloatArray, beat: BeatObserver | None) -> TunedAxis:
+def _receding(
+    setting: AxisSetting, values: FloatArray, rhythms: RhythmObserver | None
+) -> TunedAxis:
     controller = predictive_control(
         PredictiveControl(
             plant=setting.plant,
             horizon=_horizon(1 + setting.delay, *map(float, values[:3])),
             observer_poles=(1.0 - float(values[3]), 1.0 - float(values[4])),
             breath=None,
-            beat=beat,
+            rhythms=rhythms,
             prefilter=setting.prefilter,
             time_domain=setting.domain,
             delay=setting.delay,
@@ -238,22 +241,23 @@ def _receding(setting: AxisSetting, values: FloatArray, beat: BeatObserver | Non
     return _axis(setting, controller)
 
 
-def _predictive(setting: AxisSetting, beat: float, values: FloatArray) -> TunedAxis:
+def _predictive(setting: AxisSetting, periods: Periods, values: FloatArray) -> TunedAxis:
     return _receding(setting, values, None)
 
 
-def _gpc(setting: AxisSetting, beat: float, values: FloatArray) -> TunedAxis:
-    observer = BeatObserver(
-        frequency=1.0 / beat,
-        harmonics=_BEAT_HARMONICS,
-        drive=float(values[5]),
+def _gpc(setting: AxisSetting, periods: Periods, values: FloatArray) -> TunedAxis:
+    drives = float(values[5]), float(values[7])
+    beat = Rhythm(frequency=1.0 / periods.beat, harmonics=_BEAT_HARMONICS, drive=drives[0])
+    breath = Rhythm(frequency=1.0 / periods.breath, harmonics=_BREATH_HARMONICS, drive=drives[1])
+    observer = RhythmObserver(
+        rhythms=(beat, breath),
         slow_drive=float(values[6]),
         force_noise=setting.sensor_noise,
     )
     return _receding(setting, values, observer)
 
 
-def _with_observer(setting: AxisSetting, beat: float, values: FloatArray) -> TunedAxis:
+def _with_observer(setting: AxisSetting, periods: Periods, values: FloatArray) -> TunedAxis:
     controller = predictive_observer(
         PredictiveObserver(
             plant=setting.plant,
@@ -269,7 +273,7 @@ def _with_observer(setting: AxisSetting, beat: float, values: FloatArray) -> Tun
     return _axis(setting, controller)
 
 
-def _preview(setting: AxisSetting, beat: float, values: FloatArray) -> TunedAxis:
+def _preview(setting: AxisSetting, periods: Periods, values: FloatArray) -> TunedAxis:
     step = beat_preview_step(
         BeatPreview(
             plant=setting.plant,

@@ -17,7 +17,7 @@ from mrac_design.comparison.contestant import (
     TunedAxis,
     TuningParameter,
 )
-from mrac_design.comparison.setting import AxisSetting
+from mrac_design.comparison.setting import AxisSetting, Periods
 from mrac_design.controller.adaptation import AdaptationLaw, NormalisedGradientLaw
 from mrac_design.controller.adaptive import AdaptiveRST, build_step, nominal_gains
 from mrac_design.controller.oscillator import Oscillator
@@ -234,21 +234,21 @@ def _axis(
     return TunedAxis(step=step, velocity_gain=setting.velocity_gain)
 
 
-def _frozen(setting: AxisSetting, beat: float, values: FloatArray) -> TunedAxis:
+def _frozen(setting: AxisSetting, periods: Periods, values: FloatArray) -> TunedAxis:
     return _axis(setting, rst_design(setting, values), _STILL, feedforward=DirectReference())
 
 
-def _frozen_inverse(setting: AxisSetting, beat: float, values: FloatArray) -> TunedAxis:
+def _frozen_inverse(setting: AxisSetting, periods: Periods, values: FloatArray) -> TunedAxis:
     return _axis(
         setting, rst_design(setting, values), _STILL, feedforward=LeadingInverse(float(values[2]))
     )
 
 
-def _integral(setting: AxisSetting, beat: float, values: FloatArray) -> TunedAxis:
+def _integral(setting: AxisSetting, periods: Periods, values: FloatArray) -> TunedAxis:
     return _fixed(setting, _integral_design(setting, values), float(values[4]))
 
 
-def _resonant(setting: AxisSetting, beat: float, values: FloatArray) -> TunedAxis:
+def _resonant(setting: AxisSetting, periods: Periods, values: FloatArray) -> TunedAxis:
     return _fixed(setting, _resonant_design(setting, values), float(values[6]))
 
 
@@ -281,40 +281,40 @@ def _boxed(
     )
 
 
-def _mrac(setting: AxisSetting, beat: float, values: FloatArray) -> TunedAxis:
+def _mrac(setting: AxisSetting, periods: Periods, values: FloatArray) -> TunedAxis:
     design = rst_design(setting, values)
     return _axis(setting, design, _law(values[2:]), feedforward=DirectReference())
 
 
-def _mrac_inverse(setting: AxisSetting, beat: float, values: FloatArray) -> TunedAxis:
+def _mrac_inverse(setting: AxisSetting, periods: Periods, values: FloatArray) -> TunedAxis:
     design, lead = rst_design(setting, values), LeadingInverse(float(values[2]))
     return _axis(setting, design, _law(values[3:]), feedforward=lead)
 
 
-def _mrac_bias(setting: AxisSetting, beat: float, values: FloatArray) -> TunedAxis:
+def _mrac_bias(setting: AxisSetting, periods: Periods, values: FloatArray) -> TunedAxis:
     design, lead = rst_design(setting, values), LeadingInverse(float(values[2]))
     return _axis(setting, design, _law(values[3:]), feedforward=lead, bias=float(values[5]))
 
 
-def _mrac_certified(setting: AxisSetting, beat: float, values: FloatArray) -> TunedAxis:
+def _mrac_certified(setting: AxisSetting, periods: Periods, values: FloatArray) -> TunedAxis:
     design, lead = rst_design(setting, values), LeadingInverse(float(values[2]))
     law = _boxed(design, _law(values[3:]), float(values[6]))
     return _axis(setting, design, law, feedforward=lead, bias=float(values[5]))
 
 
-def _mrac_resonant(setting: AxisSetting, beat: float, values: FloatArray) -> TunedAxis:
+def _mrac_resonant(setting: AxisSetting, periods: Periods, values: FloatArray) -> TunedAxis:
     design, lead = _resonant_design(setting, values), LeadingInverse(float(values[6]))
     law = _boxed(design, _law(values[7:]), float(values[9]))
     return _axis(setting, design, law, feedforward=lead)
 
 
-def _mrac_harmonic(setting: AxisSetting, beat: float, values: FloatArray) -> TunedAxis:
+def _mrac_harmonic(setting: AxisSetting, periods: Periods, values: FloatArray) -> TunedAxis:
     design, lead = _resonant_design(setting, values), LeadingInverse(float(values[6]))
     law = _boxed(design, _law(values[7:]), float(values[9]), harmonics=HARMONICS)
     oscillator = Oscillator(
-        frequency=1.0 / beat,
-        lowest=0.7 / beat,
-        highest=1.4 / beat,
+        frequency=1.0 / periods.beat,
+        lowest=0.7 / periods.beat,
+        highest=1.4 / periods.beat,
         harmonics=HARMONICS,
         force=float(values[10]),
         tracking=float(values[11]),

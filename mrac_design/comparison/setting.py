@@ -69,6 +69,16 @@ class AxisSetting:
         return math.sqrt(self.noise**2 + self.resolution**2 / 12.0)
 
 
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Periods:
+    """What laws that take the motion's rhythms as known are told."""
+
+    beat: float
+    """Length of the usual beat (s), > 0."""
+    breath: float
+    """Length of a breath (s), > 0."""
+
+
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class Condition:
     """A motion, a force reference and a tissue under which contestants are run."""
@@ -83,8 +93,8 @@ class Condition:
     """Force reference before the pre-filter (N), one channel over the same time."""
     beats: FloatArray
     """Instants at which beats begin (s), increasing: what an ECG would show, (beats,)."""
-    beat_period: float
-    """Length of the usual beat (s): what laws that take it as known are told."""
+    periods: Periods
+    """Usual beat and breath: what laws that take them as known are told."""
     stiffness_factor: float
     """True stiffness over the design's."""
     settling: float
@@ -107,7 +117,7 @@ class Condition:
         before = self.beats[self.beats <= 1e-9]
         first = 0.0 if before.size == 0 else -float(before[-1])
         if before.size == 0 and inside.size:
-            first = max(0.0, self.beat_period - float(inside[0]))
+            first = max(0.0, self.periods.beat - float(inside[0]))
         ages = np.concatenate([[first], np.zeros(inside.size)])
         return PiecewisePolynomial(
             breakpoints=np.concatenate([[0.0], inside, [self.duration]]),

@@ -196,7 +196,7 @@ class _Search:
         setting = self.bench.setting
         sensing = Sensing.of(setting, NOISE_SEED)
         try:
-            axis = self.contestant.build(setting, self.training.beat_period, values)
+            axis = self.contestant.build(setting, self.training.periods, values)
             found = [
                 root_mean_square(
                     self.bench.force_error(axis, self.training, sensing, extra_delay=extra)

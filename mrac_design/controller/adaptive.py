@@ -145,6 +145,7 @@ def build_step(controller: AdaptiveRST) -> ControllerStep:
     own = len(controller.gain_names)
     return assemble_step(
         step,
+        time_domain=controller.time_domain,
         values=parameters.pack(values),
         command=command,
         following={

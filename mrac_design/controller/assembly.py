@@ -10,6 +10,7 @@ import casadi as ca
 from mrac_design.arrays import FloatArray
 from mrac_design.controller.step import ControllerStep
 from mrac_design.layout import Layout
+from mrac_design.time_domain import TimeDomain
 
 NO_EVENTS = Layout(())
 """For controllers that measure the force alone."""
@@ -62,10 +63,12 @@ def assemble_step(
     following: Mapping[str, ca.SX],
     signals: Mapping[str, ca.SX],
     rest: ca.SX,
+    time_domain: TimeDomain,
 ) -> ControllerStep:
     """The step whose command, advanced state by block, signals and resting state are given.
 
-    `values` are the parameters; `rest` is written in `symbols.force` and the parameters.
+    `following` is in `time_domain`; `values` are the parameters; `rest` is written in
+    `symbols.force` and the parameters.
     """
     measured = [symbols.state, symbols.force, symbols.reference]
     names = ["state", "force", "reference"]
@@ -101,5 +104,6 @@ def assemble_step(
             ["force", "parameters"],
             ["state"],
         ),
+        time_domain=time_domain,
         events=symbols.events_layout,
     )

@@ -7,7 +7,9 @@ from dataclasses import dataclass
 import casadi as ca
 
 from mrac_design.arrays import FloatArray
+from mrac_design.errors import ParameterError
 from mrac_design.layout import Layout
+from mrac_design.time_domain import Continuous, Discrete, TimeDomain
 
 _NO_EVENTS = Layout(())
 
@@ -42,5 +44,26 @@ class ControllerStep:
     signals."""
     equilibrium: ca.Function
     """(force N, parameters) -> the state at rest at that force and reference."""
+    time_domain: TimeDomain
+    """Continuous, or sampled with a period: what `next` means."""
     events: Layout = _NO_EVENTS
     """Names of what it measures beside the force; empty for a pure force controller."""
+
+
+def require_domain(step: ControllerStep, domain: TimeDomain) -> None:
+    """Raise ParameterError unless `step` was built for `domain`, and to a millionth its period."""
+    own = step.time_domain
+    if isinstance(domain, Discrete) and isinstance(own, Discrete):
+        same = abs(own.period - domain.period) <= 1e-6 * domain.period
+    else:
+        same = type(own) is type(domain)
+    if not same:
+        raise ParameterError(
+            "controller", _words(own), f"the loop is {_words(domain)}: build the controller for it"
+        )
+
+
+def _words(domain: TimeDomain) -> str:
+    if isinstance(domain, Continuous):
+        return "in continuous time"
+    return f"sampled every {domain.period:g} s"

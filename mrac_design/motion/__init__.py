@@ -3,7 +3,7 @@
 from mrac_design.motion.dual_fourier import BeatVariation, Breathing, DualFourierModel
 from mrac_design.motion.heart import AXES, HeartMotion, Origin
 from mrac_design.motion.loading import fitted_motion, load_motion, parametric_motion
-from mrac_design.motion.model_file import available_motions, find_model, read_model
+from mrac_design.motion.model_file import available_motions, find_model, names_model, read_model
 from mrac_design.motion.recorded import read_recorded_motion
 from mrac_design.motion.reference import (
     ForceReference,
@@ -48,6 +48,7 @@ __all__ = [
     "from_ppoly",
     "load_motion",
     "merged_breakpoints",
+    "names_model",
     "parametric_motion",
     "quintic_hermite",
     "read_model",

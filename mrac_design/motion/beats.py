@@ -17,6 +17,10 @@ SPREAD = 0.1
 """Deviation of the beat length, as a fraction, at which its penalty is one unit."""
 PENALTY = 0.02
 """Unit of that penalty as a fraction of a stretch's mean square: weak, the shapes decide."""
+LIKENESS = 0.75
+"""Share of the highest autocorrelation that makes a lag the beat's: two or three regular beats
+are as alike as one, and a beat between two frames is less alike than two of them; halves of a
+beat were never met above 0.65."""
 REWARD = 0.8
 """Fraction of a stretch's mean square a match may leave unexplained and still be a beat."""
 
@@ -68,11 +72,17 @@ def find_beats(position: FloatArray, *, frame_rate: float, training: int) -> Bea
 
 
 def _typical_interval(position: FloatArray, frame_rate: float) -> float:
-    """Lag of the highest autocorrelation between 0.4 and 2 s, s."""
+    """First lag between 0.4 and 2 s at which the autocorrelation peaks as high as anywhere, s."""
     centred = position - position.mean(axis=0)
     lags = np.arange(int(0.4 * frame_rate), int(2.0 * frame_rate) + 1)
-    correlation = [np.mean(centred[lag:] * centred[: len(centred) - lag]) for lag in lags]
-    return float(lags[int(np.argmax(correlation))] / frame_rate)
+    around = range(lags[0] - 1, lags[-1] + 2)
+    both = np.array([np.mean(centred[lag:] * centred[: len(centred) - lag]) for lag in around])
+    correlation = both[1:-1]
+    peaks = (correlation >= both[:-2]) & (correlation >= both[2:])
+    alike = peaks & (correlation >= LIKENESS * correlation.max())
+    # A motion that never resembles itself has no such peak.
+    first = np.argmax(alike) if alike.any() else np.argmax(correlation)
+    return float(lags[first] / frame_rate)
 
 
 def _chain(

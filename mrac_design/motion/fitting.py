@@ -6,18 +6,18 @@ Run as `python -m mrac_design.motion.fitting RECORDING.csv --out FILE`.
 from __future__ import annotations
 
 import logging
+import sys
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Annotated
 
+import click
 import numpy as np
-import typer
 from scipy.signal import butter, filtfilt
 
 from mrac_design.arrays import FloatArray
 from mrac_design.errors import MotionFileError, MracDesignError, ParameterError
 from mrac_design.motion.beats import find_beats
-from mrac_design.motion.dual_fourier import Breathing, DualFourierModel
+from mrac_design.motion.dual_fourier import BeatVariation, Breathing, DualFourierModel
 from mrac_design.motion.fit_file import Fit, write_fit
 from mrac_design.motion.fit_quality import (
     Residual,
@@ -93,14 +93,7 @@ def fit_recording(
     fitted = series_values(coefficients, phase, respiratory)
     coasting = clock.phase(t, clock.training_onsets)
     rhythm = _rhythm(clock)
-    training = slice(0, recording.training)
-    variation = fit_variation(
-        (recording.position - fitted)[training],
-        t[training],
-        clock.training_onsets,
-        clock.phase(t[training], clock.onsets),
-        clock.period,
-    )
+    variation = _variation(recording, clock, fitted)
     model = DualFourierModel(
         name=name,
         origin=Origin.FITTED,
@@ -126,6 +119,19 @@ def fit_recording(
         ),
         recorded=recorded_statistics(recording),
         generated=generated_statistics(model, float(t[-1]), SEEDS),
+    )
+
+
+def _variation(recording: Recording, clock: _Clock, fitted: FloatArray) -> BeatVariation:
+    """What the shapes leave of the training frames, beat by beat."""
+    training = slice(0, recording.training)
+    t = recording.time[training]
+    return fit_variation(
+        (recording.position - fitted)[training],
+        t,
+        clock.training_onsets,
+        clock.phase(t, clock.onsets),
+        clock.period,
     )
 
 
@@ -238,18 +244,33 @@ def fit_file(
     )
 
 
+@click.command(context_settings={"show_default": True})
+@click.argument("recording", type=click.Path(path_type=Path))
+@click.option(
+    "--out", type=click.Path(path_type=Path), required=True, help="Model file to write, TOML."
+)
+@click.option("--source", default="a recording", help="Where the recording comes from.")
+@click.option("--name", default="heart_invivo_fit", help="Name of the model.")
+@click.option("--point", default="p4", help="Tracked point.")
+@click.option("--frame-rate", default=25.0, help="Frames a second (assumed).")
+@click.option("--cutoff", default=8.0, help="Cut-off of the low-pass, Hz.")
+@click.option("--training", default=600, help="Leading frames to fit.")
+@click.option("--seed", default=SEED, help="Seed written into the model.")
 def main(
-    recording: Annotated[Path, typer.Argument(help="Track file, .csv or .mat.")],
-    out: Annotated[Path, typer.Option(help="Model file to write, TOML.")],
-    source: Annotated[str, typer.Option(help="Where the recording comes from.")] = "a recording",
-    name: Annotated[str, typer.Option(help="Name of the model.")] = "heart_invivo_fit",
-    point: Annotated[str, typer.Option(help="Tracked point.")] = "p4",
-    frame_rate: Annotated[float, typer.Option(help="Frames a second (assumed).")] = 25.0,
-    cutoff: Annotated[float, typer.Option(help="Cut-off of the low-pass, Hz.")] = 8.0,
-    training: Annotated[int, typer.Option(help="Leading frames to fit.")] = 600,
-    seed: Annotated[int, typer.Option(help="Seed written into the model.")] = SEED,
+    recording: Path,
+    out: Path,
+    source: str,
+    name: str,
+    point: str,
+    frame_rate: float,
+    cutoff: float,
+    training: int,
+    seed: int,
 ) -> None:
-    """Fit the dual Fourier heart-motion model to a recorded track and write it as TOML."""
+    """Fit the dual Fourier heart-motion model to a recorded track and write it as TOML.
+
+    RECORDING is a track file, .csv or .mat.
+    """
     logging.basicConfig(level=logging.INFO, format="%(message)s")
     try:
         fit = fit_file(
@@ -265,7 +286,7 @@ def main(
         write_fit(fit, out)
     except MracDesignError as error:
         logger.error("%s", error)
-        raise typer.Exit(code=2) from error
+        sys.exit(2)
     for residual in fit.residuals:
         logger.info(
             "beats %s: held-back residual %s mm, explained %s",
@@ -277,4 +298,4 @@ def main(
 
 
 if __name__ == "__main__":
-    typer.run(main)
+    main()

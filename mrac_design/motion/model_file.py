@@ -36,6 +36,11 @@ def available_motions() -> tuple[str, ...]:
     return tuple(sorted(path.stem for path in (models_directory() / "motions").glob("*.toml")))
 
 
+def names_model(source: str) -> bool:
+    """Whether a source of motion is a packaged model or a model file; else it is a recording."""
+    return source in available_motions() or Path(source).suffix == ".toml"
+
+
 def find_model(name_or_path: Path | str) -> DualFourierModel:
     """A packaged model by name, or the one in a TOML file.
 

@@ -1,8 +1,4 @@
-"""Heart motion from a recorded track of camera frames, CSV or MATLAB.
-
-SciPy is imported where it is used: loading its filters takes longer than generating a motion,
-and most runs read no recording.
-"""
+"""Heart motion from a recorded track of camera frames, CSV or MATLAB."""
 
 from __future__ import annotations
 
@@ -12,9 +8,10 @@ import numpy as np
 
 from mrac_design.arrays import FloatArray
 from mrac_design.errors import MotionFileError, ParameterError
+from mrac_design.motion.frames import cubic_spline, zero_phase_butterworth
 from mrac_design.motion.heart import HeartMotion, Origin, centred_motion
 from mrac_design.motion.model_file import available_motions
-from mrac_design.motion.signal import PiecewisePolynomial, from_ppoly
+from mrac_design.motion.signal import PiecewisePolynomial
 from mrac_design.motion.track_file import read_track
 
 FILTER_ORDER = 4
@@ -70,8 +67,6 @@ def _spline(
     path: Path, position: FloatArray, frame_rate: float, start: int, duration: float | None
 ) -> PiecewisePolynomial:
     """Cubic spline through the frames from `start` on, as long as asked for."""
-    from scipy.interpolate import CubicSpline
-
     frames = position.shape[0]
     if not 0 <= start < frames - 1:
         raise MotionFileError(
@@ -89,7 +84,7 @@ def _spline(
             f"last {available:.6g} s at {frame_rate:g} Hz, but {length:.6g} s are asked for: "
             "shorten the duration or take a longer recording",
         )
-    spline = from_ppoly(CubicSpline(np.arange(used.shape[0]) / frame_rate, used))
+    spline = cubic_spline(used, frame_rate=frame_rate)
     return spline if length >= available else spline.restricted(0.0, length)
 
 
@@ -113,8 +108,6 @@ def low_pass(position: FloatArray, *, frame_rate: float, cutoff: float, path: Pa
             f"{position.shape[0]} frames",
             f"too short: the low-pass filter needs more than {padding}",
         )
-    from scipy.signal import butter, filtfilt
-
-    b, a = butter(FILTER_ORDER, cutoff / nyquist)
-    filtered: FloatArray = filtfilt(b, a, position, axis=0, padlen=padding)
-    return filtered
+    return zero_phase_butterworth(
+        position, order=FILTER_ORDER, share=cutoff / nyquist, padding=padding
+    )

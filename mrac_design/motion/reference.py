@@ -7,6 +7,7 @@ from itertools import pairwise
 
 import numpy as np
 
+from mrac_design.arrays import FloatArray, readonly
 from mrac_design.errors import ParameterError
 from mrac_design.motion.signal import PiecewisePolynomial, stack
 
@@ -58,6 +59,11 @@ class ForceReference:
         if not self.steps:
             raise ParameterError("steps", (), "needs a step sequence for each force axis")
         object.__setattr__(self, "steps", tuple(self.steps))
+
+    @property
+    def initial(self) -> FloatArray:
+        """Force of each axis at time 0, N, shape (axes,)."""
+        return readonly([axis.levels[0] for axis in self.steps])
 
     @property
     def peak(self) -> tuple[float, ...]:

@@ -240,7 +240,8 @@ def merged_breakpoints(*signals: PiecewisePolynomial) -> FloatArray:
     """Sorted union of the breakpoints of `signals`, instants equal up to rounding taken once."""
     if not signals:
         raise ParameterError("signals", (), "needs at least one")
-    every = np.unique(np.concatenate([signal.breakpoints for signal in signals]))
+    # Not np.unique: it loads all of numpy.ma.
+    every = np.sort(np.concatenate([signal.breakpoints for signal in signals]))
     keep = np.concatenate(([True], np.diff(every) > _tolerance(every)))
     merged: FloatArray = every[keep]
     return merged

@@ -31,7 +31,7 @@ from mrac_design.simulation.sampling_choices import (
 )
 from mrac_design.simulation.scenario import Scenario
 from mrac_design.simulation.schedule import Schedule, build_schedule
-from mrac_design.simulation.system import ARGUMENT_NAMES, HybridSystem
+from mrac_design.simulation.system import ARGUMENT_NAMES, HybridSystem, Kinks
 from mrac_design.simulation.tableau import RK4
 from mrac_design.study import exogenous_inputs, scenario_motion
 from mrac_design.time_domain import Continuous
@@ -92,12 +92,13 @@ def build_experiment(
         delay=ComputationalDelay(sampling.delay),
         sensor=sampling.force_sensor.build(),
         joints=sampling.encoder.build(),
+        # The simulated robot of the runner is advanced period by period, without looking back.
+        kinks=Kinks.CROSSED,
     )
-    axes = len(dynamics.description.force_axes)
     inputs = exogenous_inputs(
         replace(scenario, sampling=sampling), dynamics, scenario_motion(scenario)
     )
-    resting = readonly(inputs(0.0)[axes : 2 * axes, 0])
+    resting = scenario.reference.initial
     return RealtimeExperiment(
         step=step,
         sampled=sampled,

@@ -169,6 +169,8 @@ class RealtimeReport:
     """Name of the robot."""
     controller: str
     """Which of the study's controllers."""
+    real: str
+    """Floating-point type it computes in."""
     delay: int
     """Samples between a measurement and its torque acting."""
     duration: float
@@ -184,6 +186,7 @@ class RealtimeReport:
             "scenario": self.scenario,
             "robot": self.robot,
             "controller": self.controller,
+            "real": self.real,
             "delay_samples": self.delay,
             "duration_s": self.duration,
             "machine": asdict(self.machine),

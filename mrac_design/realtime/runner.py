@@ -70,6 +70,7 @@ def run_realtime(
         scenario=scenario.name,
         robot=dynamics.description.name,
         controller=variant.name,
+        real=number.name,
         delay=experiment.delay,
         duration=scenario.simulation.duration,
         machine=machine,

@@ -1,8 +1,9 @@
 """Figures, tables and the rendering of notebooks to HTML and PDF; results come in finished.
 
-style → figures_*, tables, provenance → saving; execution, composition → rendering →
-study_report, which writes the folder of a whole study. What notebooks show is gathered here;
-what runs notebooks is imported by its own name, because a notebook has no use for it.
+style, paper → figures_*, tables*, provenance*, findings_paper → saving; execution, composition →
+rendering → *_report, each of which writes the folder of one kind of report. What most notebooks
+show is gathered here; what runs notebooks is imported by its own name, because a notebook has no
+use for it.
 """
 
 from mrac_design.report.figures_design import (

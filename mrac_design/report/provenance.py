@@ -6,10 +6,16 @@ import numpy as np
 
 from mrac_design.motion.heart import Origin
 from mrac_design.polynomials.rationals import polynomial_latex
+from mrac_design.report.paper import paper_simulation
+from mrac_design.report.provenance_reality import law_extras, measurement, tissue_and_friction
 from mrac_design.report.tables import Quantity, Table
 from mrac_design.study import StudyRecord
 
 _FROM_PAPER = "stated in [Z]"
+_READING_OF_ERROR = (
+    "published",
+    "5 % and 25 % as in [Z]; which parameters it means, and their sign, is assumed",
+)
 
 
 def scenario_provenance(study: StudyRecord) -> Table:
@@ -22,7 +28,13 @@ def scenario_provenance(study: StudyRecord) -> Table:
         header=("quantity", "value", "origin", "where from"),
         rows=tuple(
             (q.name, q.value, q.origin, q.remark)
-            for q in (*_setting(study), *_controller(study), *_derived(study))
+            for q in (
+                *_setting(study),
+                *tissue_and_friction(study.scenario),
+                *measurement(study.scenario.sampling),
+                *_controller(study),
+                *_derived(study),
+            )
         ),
     )
 
@@ -32,16 +44,23 @@ def _setting(study: StudyRecord) -> tuple[Quantity, ...]:
     peaks = ", ".join(f"{peak:g}" for peak in scenario.reference.peak)
     error = scenario.model_error
     perfect = error.body_scale == error.first_joint_scale == 1
+    simulation = paper_simulation(scenario)
+    chosen = (Origin.ASSUMED.value, "chosen in the scenario")
+    repeated = (
+        chosen if simulation is None else ("published", f"simulation {simulation.number} of [Z]")
+    )
     return (
         Quantity(
             "robot parameters", study.robot.name, Origin.ASSUMED.value, "D2M2's are unpublished"
         ),
-        Quantity("heart motion", motion.name, motion.origin.value, "source: see below"),
+        Quantity("heart motion", motion.name, motion.origin.value, "source given in this chapter"),
         *(
             Quantity("heart motion, assumption", "", Origin.ASSUMED.value, text)
             for text in motion.assumptions
         ),
-        _published("true stiffness $K_s$", scenario.stiffness, "N/m", 800.0),
+        _published("true stiffness $K_s$", scenario.stiffness, "N/m", 800.0)
+        if simulation is None
+        else Quantity("true stiffness $K_s$", f"{scenario.stiffness:g} N/m", *repeated),
         Quantity(
             "force reference",
             f"steps up to {peaks} N",
@@ -52,9 +71,9 @@ def _setting(study: StudyRecord) -> tuple[Quantity, ...]:
             "controller's robot model",
             "perfect"
             if perfect
-            else f"bodies × {error.body_scale:g}, first joint × {error.first_joint_scale:g}",
-            "published" if perfect else Origin.ASSUMED.value,
-            "simulation 1 of [Z]" if perfect else "chosen in the scenario",
+            else f"bodies × {error.body_scale:g}, first joint "
+            f"× {error.body_scale * error.first_joint_scale:g} in all",
+            *(repeated if perfect or simulation is None else _READING_OF_ERROR),
         ),
     )
 
@@ -85,6 +104,7 @@ def _controller(study: StudyRecord) -> tuple[Quantity, ...]:
             assumed,
             r"[Z] gives no $\gamma$",
         ),
+        *law_extras(study.scenario.adaptation),
         Quantity(
             "start of the adaptation", "nominal gains", assumed, r"[Z] does not give $\theta(0)$"
         ),

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Callable, Mapping, Sequence
 from datetime import date
 from pathlib import Path
@@ -14,6 +15,9 @@ from mrac_design.publishing import publish_file, staging_folder
 from mrac_design.report.composition import compose_markdown
 from mrac_design.report.execution import execute_notebooks
 
+RESULTS_VARIABLE = "MRAC_RESULTS"
+"""Environment variable: the folder in which a notebook leaves what else belongs to a report."""
+
 ReportProgress = Callable[[str, float], None]
 """Called with what is being done and the fraction (0…1) of the rendering that is done."""
 
@@ -23,6 +27,14 @@ _MARKDOWN = (
     "+lists_without_preceding_blankline"
 )
 _EXECUTION_SHARE = 0.85
+_SPACING = {
+    "\N{COMBINING DIAERESIS}": "\N{DIAERESIS}",
+    "\N{COMBINING DOT ABOVE}": "\N{DOT ABOVE}",
+    "\N{COMBINING CIRCUMFLEX ACCENT}": "\N{MODIFIER LETTER CIRCUMFLEX ACCENT}",
+    "\N{COMBINING TILDE}": "\N{SMALL TILDE}",
+    "\N{COMBINING MACRON}": "\N{MACRON}",
+}
+_ACCENT = re.compile(f'(<mo accent="true">)([{"".join(_SPACING)}])(</mo>)')
 
 
 def ignore_progress(message: str, fraction: float) -> None:
@@ -104,7 +116,18 @@ def _write_html(source: Path, metadata: list[str]) -> Path:
     options = ["--embed-resources", "--mathml", f"--css={_TEMPLATES / 'report.css'}"]
     options += [f"--template={_TEMPLATES / 'report.html'}", "--syntax-highlighting=tango"]
     _pandoc(source, "html5", target, metadata + options)
+    page = target.read_text(encoding="utf-8")
+    target.write_text(with_spacing_accents(page), encoding="utf-8")
     return target
+
+
+def with_spacing_accents(page: str) -> str:
+    """An HTML page whose MathML accents are characters of their own.
+
+    Pandoc writes combining ones, which browsers set beside and above the letter they belong to;
+    MathML's operator dictionary knows the spacing ones.
+    """
+    return _ACCENT.sub(lambda found: found[1] + _SPACING[found[2]] + found[3], page)
 
 
 def _write_pdf(source: Path, metadata: list[str]) -> Path:

@@ -13,7 +13,12 @@ from typing import Any
 from mrac_design.assessment.choices import choices_path, load_choices
 from mrac_design.errors import CertificateError
 from mrac_design.publishing import publish_contents, staging_folder
-from mrac_design.report.rendering import ReportProgress, ignore_progress, render_report
+from mrac_design.report.rendering import (
+    RESULTS_VARIABLE,
+    ReportProgress,
+    ignore_progress,
+    render_report,
+)
 from mrac_design.report.study_report import with_absolute_paths
 from mrac_design.resources import notebooks_directory
 from mrac_design.simulation.scenario import Scenario, save_scenario
@@ -22,9 +27,6 @@ from mrac_design.verify import verify_certificate
 
 STABILITY_NOTEBOOKS = ("05_stability.py",)
 """Chapters of the report, in order."""
-
-RESULTS_VARIABLE = "MRAC_RESULTS"
-"""Environment variable: the folder in which the notebook leaves certificates and values."""
 
 CHOICES_VARIABLE = "MRAC_STABILITY"
 """Environment variable: the file of choices the notebook is to use."""

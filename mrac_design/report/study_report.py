@@ -13,7 +13,7 @@ from mrac_design.export.gains import gains_document
 from mrac_design.export.values import study_values
 from mrac_design.publishing import publish_contents, staging_folder
 from mrac_design.report.rendering import ReportProgress, ignore_progress, render_report
-from mrac_design.report.saving import save_figures
+from mrac_design.report.saving import save_figures, study_figures
 from mrac_design.resources import notebooks_directory
 from mrac_design.simulation.scenario import Scenario, save_scenario
 from mrac_design.study import StudyRecord, run_study
@@ -39,15 +39,15 @@ def write_study_report(
     )
     with staging_folder(out) as folder:
         progress("drawing figures", _SIMULATION_SHARE)
-        save_figures(study, folder / "figures")
+        save_figures(study_figures(study), folder / "figures")
         save_scenario(scenario, folder / "scenario.toml")
-        _write_json(study_values(study), folder / "values.json")
-        _write_json(gains_document(scenario, study.design), folder / "gains.json")
+        write_json(study_values(study), folder / "values.json")
+        write_json(gains_document(scenario, study.design), folder / "gains.json")
         render_report(
             [notebooks_directory() / name for name in REPORT_NOTEBOOKS],
             title=scenario.title,
             subtitle=f"Robot {study.robot.name}, heart motion {study.motion.name}, "
-            f"mrac_design {version('mrac-design')}",
+            f"tissue {scenario.stiffness:g} N/m, mrac_design {version('mrac-design')}",
             scenario=folder / "scenario.toml",
             html=folder / "report.html",
             pdf=folder / "report.pdf",
@@ -68,7 +68,8 @@ def with_absolute_paths(scenario: Scenario) -> Scenario:
     return replace(scenario, robot=absolute(scenario.robot), motion=motion)
 
 
-def _write_json(content: Mapping[str, Any], path: Path) -> None:
+def write_json(content: Mapping[str, Any], path: Path) -> None:
+    """Plain data as a JSON file for people and machines."""
     text = json.dumps(content, indent=2, ensure_ascii=False, allow_nan=False)
     path.write_text(text + "\n", encoding="utf-8")
 

@@ -5,13 +5,8 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 
+from mrac_design.report.paper import PAPER_TORQUE_LIMIT, paper_error, paper_simulation
 from mrac_design.study import VARIANTS, StudyRecord
-
-PAPER_ERROR_PERCENT = 3.0
-"""Largest force error that [Z] states for its first simulation, "about 3 %" on every axis."""
-
-PAPER_TORQUE_LIMIT = 150.0
-"""Torque limit of every actuator in [Z] (N·m)."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -52,25 +47,37 @@ class Quantity:
 
 def comparison_table(study: StudyRecord) -> Table:
     """Largest force error (% of the largest desired force): the paper's beside every variant."""
+    simulation = paper_simulation(study.scenario)
+    theirs = () if simulation is None else ("[Z], adaptive",)
+    said = (
+        "[Z] has no simulation under these conditions."
+        if simulation is None
+        else f"The figures of [Z], simulation {simulation.number}, are for its own robot, "
+        "recording and reference, which are not public; – where it gives none."
+    )
     return Table(
         caption=(
             "Largest force error $|y - F_d|$ in per cent of the axis's largest desired force, "
-            f"after the first {study.scenario.simulation.settling:g} s. [Z] gives one figure for "
-            "its own recording and reference, which are not public."
+            f"after the first {study.scenario.simulation.settling:g} s. {said}"
         ),
-        header=("axis", "[Z], adaptive", *(variant.title for variant in VARIANTS)),
+        header=("axis", *theirs, *(variant.title for variant in VARIANTS)),
         rows=tuple(
             (
                 axis,
-                f"about {PAPER_ERROR_PERCENT:g} %",
-                *(
-                    f"{study.tracking[variant.name][axis].max_force_error_percent:.3g} %"
-                    for variant in VARIANTS
-                ),
+                *(paper_error(simulation, axis) for _ in theirs),
+                *largest_errors(study, axis),
             )
             for axis in study.robot.force_axes
         ),
-        numeric=(1, 2, 3, 4),
+        numeric=tuple(range(1, 1 + len(theirs) + len(VARIANTS))),
+    )
+
+
+def largest_errors(study: StudyRecord, axis: str) -> tuple[str, ...]:
+    """Cells: largest force error (% of the axis's largest desired force), variant by variant."""
+    return tuple(
+        f"{study.tracking[variant.name][axis].max_force_error_percent:.3g} %"
+        for variant in VARIANTS
     )
 
 

@@ -1,20 +1,13 @@
 """The robot: description, files, kinematics, rigid-body dynamics and task space.
 
-description → parameters, kinematics → rigid_body → dynamics → task_space, posture. A
+parts → description → parameters, kinematics → rigid_body → dynamics → task_space, posture. A
 `RobotDescription` holds numbers, `build_dynamics` turns it into CasADi functions,
 `build_task_space` into Mx, Vx and Gx.
 """
 
 from __future__ import annotations
 
-from mrac_design.robot.description import (
-    AXIS_NAMES,
-    Body,
-    Joint,
-    JointType,
-    RobotDescription,
-    TaskDefinition,
-)
+from mrac_design.robot.description import RobotDescription
 from mrac_design.robot.dynamics import RobotDynamics, build_dynamics
 from mrac_design.robot.loading import available_robots, load_robot
 from mrac_design.robot.parameters import (
@@ -23,6 +16,7 @@ from mrac_design.robot.parameters import (
     parameter_names,
     scaled_parameters,
 )
+from mrac_design.robot.parts import AXIS_NAMES, Body, Joint, JointType, TaskDefinition
 from mrac_design.robot.posture import check_posture, condition_number, condition_numbers
 from mrac_design.robot.task_space import TaskSpaceModel, build_task_space
 

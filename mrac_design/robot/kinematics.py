@@ -13,7 +13,8 @@ import casadi as ca
 import numpy as np
 from numpy.typing import ArrayLike
 
-from mrac_design.robot.description import Joint, JointType, RobotDescription
+from mrac_design.robot.description import RobotDescription
+from mrac_design.robot.parts import Joint, JointType
 
 _SNAP = 1e-15
 """Cosines and sines of constant angles this close to −1, 0, 1 are those numbers: a file holds

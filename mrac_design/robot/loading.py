@@ -7,14 +7,8 @@ from pathlib import Path
 from mrac_design.arrays import FloatArray, readonly
 from mrac_design.errors import ModelFileError
 from mrac_design.resources import models_directory
-from mrac_design.robot.description import (
-    AXIS_NAMES,
-    Body,
-    Joint,
-    JointType,
-    RobotDescription,
-    TaskDefinition,
-)
+from mrac_design.robot.description import RobotDescription
+from mrac_design.robot.parts import AXIS_NAMES, Body, Joint, JointType, TaskDefinition
 from mrac_design.strict_toml import Table, read_table, shown
 
 _UNITS = {

@@ -16,7 +16,8 @@ import numpy as np
 
 from mrac_design.arrays import FloatArray, readonly
 from mrac_design.errors import ParameterError
-from mrac_design.robot.description import Body, RobotDescription
+from mrac_design.robot.description import RobotDescription
+from mrac_design.robot.parts import Body
 
 _LETTERS = ("m", "mx", "my", "mz", "Ixx", "Iyy", "Izz", "Ixy", "Ixz", "Iyz", "Ia")
 

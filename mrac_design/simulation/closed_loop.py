@@ -16,13 +16,14 @@ from numpy.typing import ArrayLike
 
 from mrac_design.arrays import FloatArray, readonly
 from mrac_design.controller.linearisation import Linearisation
-from mrac_design.controller.robot_step import within_limits
-from mrac_design.controller.step import ControllerStep
+from mrac_design.controller.robot_step import saturated
+from mrac_design.controller.step import ControllerStep, require_domain
 from mrac_design.layout import Layout
 from mrac_design.robot import RobotDynamics, check_posture, inertial_parameters
 from mrac_design.simulation.contact import Contact, Touch
 from mrac_design.simulation.friction import Friction
-from mrac_design.simulation.system import ARGUMENT_NAMES, HybridSystem
+from mrac_design.simulation.system import ARGUMENT_NAMES, MODES, Event, HybridSystem, Kinks
+from mrac_design.time_domain import Continuous
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -46,12 +47,16 @@ def build_force_loop(
     *,
     contact: Contact,
     friction: Friction,
+    kinks: Kinks = Kinks.LOCATED,
 ) -> ForceLoop:
     """Close the loop over the true `contact` with the true `friction` of the joints.
 
-    Efforts are limited to the robot's own limits. Raises ParameterError for a contact made for
-    another number of axes.
+    Efforts are limited to the robot's own limits; events are the limits of the efforts and, where
+    it can be lost, the contact. Raises ParameterError for a contact made for another number of
+    axes, or controllers that are not continuous.
     """
+    for controller in controllers:
+        require_domain(controller, Continuous())
     robot = dynamics.description
     axes, n = robot.force_axes, robot.joint_count
     values = {
@@ -74,7 +79,8 @@ def build_force_loop(
         (("heart", len(axes)), ("reference", len(axes)), *contact.inputs(len(axes)).blocks)
     )
     plant = Plant(dynamics=dynamics, contact=contact, friction=friction)
-    system = _system(plant, linearisation, controllers, state, inputs, parameters)
+    equations = _Equations(plant, linearisation, tuple(controllers))
+    system = _system(equations, kinks, state, inputs, parameters)
     return ForceLoop(
         system=system,
         parameter_values=parameters.pack(values),
@@ -99,8 +105,43 @@ class Plant:
         states: Mapping[str, ca.SX],
         exogenous: Mapping[str, ca.SX],
         symbols: Mapping[str, ca.SX],
+        made: ca.SX | None = None,
     ) -> tuple[ca.SX, ca.SX]:
-        """Tip position (m) and contact force (N), (k,) each."""
+        """Tip position (m) and contact force (N), (k,) each; `made` as `Touch` has it."""
+        touch, tip = self._touch(states, exogenous, symbols, made)
+        return tip, self.contact.force(touch)
+
+    def contact_events(self) -> tuple[Event, ...]:
+        """Contact made and lost on each axis; none where it is never lost."""
+        axes = self.dynamics.description.force_axes
+        if not self.contact.can_be_lost:
+            return ()
+        return tuple(Event(name=f"contact {a}", rising="made", falling="lost") for a in axes)
+
+    def effort_events(self) -> tuple[Event, ...]:
+        """The limit of each joint's effort, reached and left."""
+        joints = self.dynamics.description.joints
+        return tuple(
+            Event(name=f"effort limit of {joint.name}", rising="left", falling="reached")
+            for joint in joints
+        )
+
+    def contact_functions(
+        self,
+        states: Mapping[str, ca.SX],
+        exogenous: Mapping[str, ca.SX],
+        symbols: Mapping[str, ca.SX],
+    ) -> ca.SX:
+        """Event functions (N) of `contact_events`."""
+        return self.contact.holds(self._touch(states, exogenous, symbols, None)[0])
+
+    def _touch(
+        self,
+        states: Mapping[str, ca.SX],
+        exogenous: Mapping[str, ca.SX],
+        symbols: Mapping[str, ca.SX],
+        made: ca.SX | None,
+    ) -> tuple[Touch, ca.SX]:
         axes = len(self.dynamics.description.force_axes)
         q, qd = states["joint_position"], states["joint_velocity"]
         tip = self.dynamics.task_position(q)[:axes]
@@ -109,8 +150,9 @@ class Plant:
             velocity=self.dynamics.task_jacobian(q)[:axes, :] @ qd,
             inputs=exogenous,
             parameters=symbols,
+            made=made,
         )
-        return tip, self.contact.force(touch)
+        return touch, tip
 
     def acceleration(
         self,
@@ -125,61 +167,121 @@ class Plant:
         return contact_acceleration(self.dynamics, q, qd, left, force, symbols["inertia"])
 
 
+@dataclass(frozen=True, slots=True, eq=False)
+class _Equations:
+    """What moves and what is recorded, written in any symbols."""
+
+    plant: Plant
+    linearisation: Linearisation
+    controllers: tuple[ControllerStep, ...]
+
+    def written(
+        self,
+        states: Mapping[str, ca.SX],
+        exogenous: Mapping[str, ca.SX],
+        symbols: Mapping[str, ca.SX],
+        modes: _Modes | None,
+    ) -> _Written:
+        """The equations with contact and limits in given modes, or as the state has them."""
+        axes = self.plant.dynamics.description.force_axes
+        q, qd = states["joint_position"], states["joint_velocity"]
+        made = modes.made if modes is not None and self.plant.contact.can_be_lost else None
+        tip, force = self.plant.contact_force(states, exogenous, symbols, made)
+        commands, following, signals = [], [], []
+        for i, (axis, step) in enumerate(zip(axes, self.controllers, strict=True)):
+            own, reference = states[f"controller_{axis}"], exogenous["reference"][i]
+            own_parameters = symbols[f"controller_{axis}"]
+            command = step.command(own, force[i], reference, own_parameters)
+            advanced, signal = step.advance(own, force[i], reference, command, own_parameters)
+            commands.append(command)
+            following.append(advanced)
+            signals.append(step.signals.split(signal))
+        command = ca.vertcat(*commands)
+        wanted = self.linearisation.torque(q, qd, force, command, symbols["linearisation"])
+        limit = symbols["effort_limit"]
+        within = None if modes is None else modes.within
+        effort = saturated(wanted, limit) if within is None else limited(wanted, limit, within)
+        qdd = self.plant.acceleration(states, effort, force, symbols)
+        recorded = {
+            "force": force,
+            "force_reference": exogenous["reference"],
+            "tip": tip,
+            "heart": exogenous["heart"],
+            "effort": effort,
+            "joint_position": q,
+            "joint_velocity": qd,
+            "command": command,
+            **{name: ca.vertcat(*(s[name] for s in signals)) for name in signals[0]},
+        }
+        return _Written(
+            rate=ca.vertcat(qd, qdd, *following), margin=limit - ca.fabs(wanted), recorded=recorded
+        )
+
+
+def limited(wanted: ca.SX, limit: ca.SX, within: ca.SX) -> ca.SX:
+    """`wanted` where it is taken to be within ± `limit` (1), else the limit with its sign (0).
+
+    By factors and minima, entry by entry: branches would break the straight line of the program.
+    """
+    beyond = 1 + (1 - within) * _HUGE
+    reach = limit + within * _HUGE
+    return ca.fmax(ca.fmin(wanted * beyond, reach), -reach)
+
+
+_HUGE = 1e30
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class _Modes:
+    """Modes of the events as the rate goes by them."""
+
+    made: ca.SX
+    within: ca.SX
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class _Written:
+    """Expressions of a loop."""
+
+    rate: ca.SX
+    margin: ca.SX
+    recorded: Mapping[str, ca.SX]
+
+
 def _system(
-    plant: Plant,
-    linearisation: Linearisation,
-    controllers: Sequence[ControllerStep],
-    state: Layout,
-    inputs: Layout,
-    parameters: Layout,
+    equations: _Equations, kinks: Kinks, state: Layout, inputs: Layout, parameters: Layout
 ) -> HybridSystem:
-    axes = plant.dynamics.description.force_axes
-    held = Layout(())
+    plant = equations.plant
+    contact_events = plant.contact_events()
+    events = (*contact_events, *plant.effort_events()) if kinks is Kinks.LOCATED else ()
+    held = Layout(((MODES, len(events)),) if events else ())
     x, z = state.symbols("state"), held.symbols("held")
     v, p = inputs.symbols("input"), parameters.symbols("parameters")
-    states, exogenous, symbols = state.split(x), inputs.split(v), parameters.split(p)
-    q, qd = states["joint_position"], states["joint_velocity"]
-
-    tip, force = plant.contact_force(states, exogenous, symbols)
-    commands, following, signals = [], [], []
-    for i, (axis, step) in enumerate(zip(axes, controllers, strict=True)):
-        own, reference = states[f"controller_{axis}"], exogenous["reference"][i]
-        own_parameters = symbols[f"controller_{axis}"]
-        command = step.command(own, force[i], reference, own_parameters)
-        advanced, signal = step.advance(own, force[i], reference, command, own_parameters)
-        commands.append(command)
-        following.append(advanced)
-        signals.append(step.signals.split(signal))
-    command = ca.vertcat(*commands)
-    wanted = linearisation.torque(q, qd, force, command, symbols["linearisation"])
-    still = linearisation.torque(q, qd, force, ca.DM.zeros(len(axes)), symbols["linearisation"])
-    effort = within_limits(wanted, wanted - still, symbols["effort_limit"])
-    qdd = plant.acceleration(states, effort, force, symbols)
-    rate = ca.vertcat(qd, qdd, *following)
-
-    recorded = {
-        "force": force,
-        "force_reference": exogenous["reference"],
-        "tip": tip,
-        "heart": exogenous["heart"],
-        "effort": effort,
-        "joint_position": q,
-        "joint_velocity": qd,
-        "command": command,
-        **{name: ca.vertcat(*(s[name] for s in signals)) for name in signals[0]},
-    }
-    outputs = Layout(tuple((name, value.numel()) for name, value in recorded.items()))
     arguments = [x, z, v, p]
+    variables = state.split(x), inputs.split(v), parameters.split(p)
+
+    def function(name: str, result: ca.SX, label: str) -> ca.Function:
+        return ca.Function(name, arguments, [result], list(ARGUMENT_NAMES), [label])
+
+    plain = equations.written(*variables, None)
+    moving, functions = plain, None
+    if events:
+        made, within = ca.vertsplit(z, [0, len(contact_events), len(events)])
+        moving = equations.written(*variables, _Modes(made, within))
+        functions = ca.vertcat(plant.contact_functions(*variables), moving.margin)
+    outputs = Layout(tuple((name, value.numel()) for name, value in plain.recorded.items()))
     return HybridSystem(
         state=state,
         held=held,
         inputs=inputs,
         parameters=parameters,
         outputs=outputs,
-        rate=ca.Function("rate", arguments, [rate], list(ARGUMENT_NAMES), ["rate"]),
-        output=ca.Function(
-            "output", arguments, [outputs.join(recorded)], list(ARGUMENT_NAMES), ["output"]
-        ),
+        rate=function("rate", moving.rate, "rate"),
+        output=function("output", outputs.join(plain.recorded), "output"),
+        events=events,
+        event_functions=None
+        if functions is None
+        else function("event_functions", functions, "events"),
     )
 
 

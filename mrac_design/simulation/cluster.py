@@ -2,10 +2,13 @@
 
 from __future__ import annotations
 
+import hashlib
 import pickle
 from collections.abc import Iterator, Sequence
+from concurrent.futures import CancelledError
 from dataclasses import dataclass
 from itertools import islice
+from typing import Any
 
 from mrac_design.arrays import FloatArray
 from mrac_design.errors import EnsembleError
@@ -32,7 +35,8 @@ class DaskCluster:
         Raises EnsembleError when there is no scheduler, no worker, or no way to go on.
         """
         try:
-            from distributed import Client, KilledWorker, as_completed
+            from distributed import Client, KilledWorker
+            from distributed.comm.core import CommClosedError
         except ImportError as problem:
             raise EnsembleError(
                 "clusters need dask and distributed: pip install 'mrac-design[cluster]'"
@@ -47,23 +51,39 @@ class DaskCluster:
         with client:
             if not client.scheduler_info(n_workers=-1)["workers"]:
                 raise EnsembleError(f"the Dask cluster at {self.address} has no workers")
-            waiting = iter(chunks)
-
-            def submit(number: int) -> object:
-                return client.submit(work, payload, number, pure=False, retries=_RETRIES)
-
-            ahead = 4 * max(1, sum(client.nthreads().values()))
-            pending = as_completed(
-                [submit(number) for number in islice(waiting, ahead)], loop=client.loop
-            )
             try:
-                for future in pending:
-                    yield future.result()
-                    number = next(waiting, None)
-                    if number is not None:
-                        pending.add(submit(number))
+                yield from _as_completed(client, payload, chunks)
             except KilledWorker as problem:
                 raise EnsembleError(
                     f"the workers at {self.address} die of the same chunk again and again: "
                     f"{problem}"
                 ) from problem
+            except (CommClosedError, CancelledError) as problem:
+                raise EnsembleError(
+                    f"the Dask scheduler at {self.address} went away: start it again; what a store "
+                    "keeps is not run again"
+                ) from problem
+
+
+def _as_completed(
+    client: Any, payload: bytes, chunks: Sequence[int]
+) -> Iterator[tuple[int, FloatArray]]:
+    """Results of the chunks, a few submitted ahead."""
+    from distributed import as_completed
+
+    # A task of its own: it goes to one worker, others fetch it from there, and a lost one is made
+    # again by the scheduler.
+    key = f"mrac-ensemble-{hashlib.sha256(payload).hexdigest()}"
+    shared = client.submit(bytes, payload, key=key, retries=_RETRIES)
+
+    def submit(number: int) -> object:
+        return client.submit(work, shared, number, pure=False, retries=_RETRIES)
+
+    waiting = iter(chunks)
+    ahead = 4 * max(1, sum(client.nthreads().values()))
+    pending = as_completed([submit(number) for number in islice(waiting, ahead)], loop=client.loop)
+    for future in pending:
+        yield future.result()
+        number = next(waiting, None)
+        if number is not None:
+            pending.add(submit(number))

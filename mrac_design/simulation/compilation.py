@@ -16,6 +16,7 @@ import tempfile
 from functools import cache
 from pathlib import Path
 
+from mrac_design.derivation_cache import cache_directory
 from mrac_design.errors import CompilationError
 
 _LOG = logging.getLogger(__name__)
@@ -62,7 +63,7 @@ def compile_library(source: str, compiler: str) -> ctypes.CDLL:
     key = "\n".join((source, " ".join(flags), compiler, compiler_version, _processor()))
     name = f"{hashlib.sha256(key.encode()).hexdigest()[:32]}.so"
     obstacles = []
-    for find_directory in (_user_cache, _private_directory):
+    for find_directory in (cache_directory, _private_directory):
         try:
             library = find_directory() / name
             if library.exists():
@@ -100,11 +101,6 @@ def _compile(source: str, command: list[str], flags: tuple[str, ...], library: P
             raise CompilationError(full, result.stderr or "it wrote no library")
         # Renaming is atomic: another process sees the whole library or none.
         built.replace(library)
-
-
-def _user_cache() -> Path:
-    home = os.environ.get("XDG_CACHE_HOME") or Path.home() / ".cache"
-    return Path(home) / "mrac_design"
 
 
 @cache

@@ -39,6 +39,9 @@ class Touch:
     """Inputs of the loop by name, those the law asked for among them."""
     parameters: Mapping[str, ca.SX]
     """Parameters of the loop by name, the law's among them."""
+    made: ca.SX | None = None
+    """Where contact is taken for made (1) or lost (0), (k,), whatever the depth says; None leaves
+    it to the depth."""
 
 
 class Contact(Protocol):
@@ -55,6 +58,13 @@ class Contact(Protocol):
 
     def force(self, touch: Touch) -> ca.SX:
         """Contact force Fe on the tissue (N), (k,)."""
+
+    @property
+    def can_be_lost(self) -> bool:
+        """Whether the force vanishes where the tool leaves the tissue."""
+
+    def holds(self, touch: Touch) -> ca.SX:
+        """Event functions (N), (k,): positive where contact is made; (0,) if it is never lost."""
 
     def rest_depth(self, force: ArrayLike) -> FloatArray:
         """Depth (m), shape (k,), at which it holds `force` (N) at rest at the beginning."""
@@ -86,6 +96,13 @@ class LinearSpring:
     def force(self, touch: Touch) -> ca.SX:
         return touch.parameters["stiffness"] * touch.depth
 
+    @property
+    def can_be_lost(self) -> bool:
+        return False
+
+    def holds(self, touch: Touch) -> ca.SX:
+        return ca.SX(0, 1)
+
     def rest_depth(self, force: ArrayLike) -> FloatArray:
         return readonly(np.asarray(force, dtype=float) / self.stiffness)
 
@@ -115,6 +132,13 @@ class WithDamper:
     def force(self, touch: Touch) -> ca.SX:
         rate = touch.velocity - touch.inputs["heart_velocity"]
         return self.tissue.force(touch) + touch.parameters["tissue_damping"] * rate
+
+    @property
+    def can_be_lost(self) -> bool:
+        return self.tissue.can_be_lost
+
+    def holds(self, touch: Touch) -> ca.SX:
+        return self.tissue.holds(touch)
 
     def rest_depth(self, force: ArrayLike) -> FloatArray:
         return self.tissue.rest_depth(force)
@@ -148,6 +172,13 @@ class ScheduledTissue:
     def force(self, touch: Touch) -> ca.SX:
         return touch.inputs["tissue_factor"] * self.tissue.force(touch)
 
+    @property
+    def can_be_lost(self) -> bool:
+        return self.tissue.can_be_lost
+
+    def holds(self, touch: Touch) -> ca.SX:
+        return self.tissue.holds(touch)
+
     def rest_depth(self, force: ArrayLike) -> FloatArray:
         return readonly(self.tissue.rest_depth(force) / self.factor.levels[0])
 
@@ -172,7 +203,17 @@ class OneSided:
         return self.tissue.exogenous(heart)
 
     def force(self, touch: Touch) -> ca.SX:
+        if touch.made is not None:
+            return touch.made * self.tissue.force(touch)
         return ca.if_else(touch.depth > 0, ca.fmax(self.tissue.force(touch), 0), 0)
+
+    @property
+    def can_be_lost(self) -> bool:
+        return True
+
+    def holds(self, touch: Touch) -> ca.SX:
+        # Made by the depth alone, lost also by a damper that would have to pull.
+        return ca.fmin(touch.parameters["stiffness"] * touch.depth, self.tissue.force(touch))
 
     def rest_depth(self, force: ArrayLike) -> FloatArray:
         if np.any(np.asarray(force) < 0):

@@ -4,25 +4,35 @@ from __future__ import annotations
 
 import ctypes
 import logging
+from dataclasses import dataclass
 from typing import Any, Protocol
 
-import casadi as ca
 import numpy as np
 
-from mrac_design.arrays import FloatArray
+from mrac_design.arrays import FloatArray, readonly
 from mrac_design.codegen.llvm_machine import LlvmModule, llvm_available
-from mrac_design.codegen.machine import casadi_function
 from mrac_design.errors import CompilationError
 from mrac_design.simulation.compilation import compile_library, find_compiler
-from mrac_design.simulation.emission import simplified
-from mrac_design.simulation.llvm_program import llvm_program
+from mrac_design.simulation.kept_program import kept_c_program
 from mrac_design.simulation.method import Method, spans_records
-from mrac_design.simulation.program import c_program
 from mrac_design.simulation.schedule import Schedule
-from mrac_design.simulation.stepping import finished, prepare, step_program
 from mrac_design.simulation.system import HybridSystem
 
 _LOG = logging.getLogger(__name__)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class Records:
+    """What a part of a run brings back."""
+
+    outputs: FloatArray
+    """Recorded outputs, shape (rows, outputs)."""
+    events: FloatArray
+    """Rows (instant s, number of the event, its new mode), in order of time; the number -1 says
+    that there were too many at that instant."""
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "events", readonly(self.events, (-1, 3)))
 
 
 class Engine(Protocol):
@@ -41,8 +51,8 @@ class Engine(Protocol):
         parameters: FloatArray,
         state: FloatArray,
         held: FloatArray,
-    ) -> FloatArray:
-        """Outputs recorded in that part of the schedule, shape (rows, outputs).
+    ) -> Records:
+        """Outputs recorded and events met in that part of the schedule.
 
         `coefficients` are the inputs' (segments, channels, powers), ascending powers.
         """
@@ -76,9 +86,10 @@ class NativeEngine:
     spanning = False
     """Whether it takes schedules whose steps span several records."""
 
-    def __init__(self, entry: Any, *, outputs: int, powers: int) -> None:
+    def __init__(self, entry: Any, system: HybridSystem, *, powers: int) -> None:
         self._run = entry
-        self._outputs = outputs
+        self._outputs = system.outputs.size
+        self._events = len(system.events)
         self._powers = powers
 
     def run(
@@ -89,13 +100,17 @@ class NativeEngine:
         parameters: FloatArray,
         state: FloatArray,
         held: FloatArray,
-    ) -> FloatArray:
+    ) -> Records:
         assert coefficients.shape[2] == self._powers, "inputs of another degree"
         recorded = np.empty((int(schedule.records[part].sum()), self._outputs))
-        arrays = (coefficients, parameters, state, held, recorded)
+        arrays = [coefficients, parameters, state, held, recorded]
+        log = np.zeros((1, 3))
+        if self._events:
+            log = empty_log(schedule, part)
+            arrays.append(log)
         rows = run_part(self._run, schedule, part, *arrays)
         assert rows == recorded.shape[0]
-        return recorded
+        return Records(outputs=recorded, events=log[1 : 1 + int(log[0, 0])])
 
 
 class CompiledEngine(NativeEngine):
@@ -107,8 +122,9 @@ class CompiledEngine(NativeEngine):
         self, system: HybridSystem, method: Method, *, input_powers: int, compiler: str
     ) -> None:
         self.spanning = spans_records(method)
-        library = compile_library(c_program(system, method, input_powers=input_powers), compiler)
-        super().__init__(run_entry(library.run), outputs=system.outputs.size, powers=input_powers)
+        source = kept_c_program(system, method, input_powers=input_powers)
+        library = compile_library(source, compiler)
+        super().__init__(run_entry(library.run), system, powers=input_powers)
 
 
 class LlvmEngine(NativeEngine):
@@ -117,23 +133,25 @@ class LlvmEngine(NativeEngine):
     name = "LLVM"
 
     def __init__(self, system: HybridSystem, method: Method, *, input_powers: int) -> None:
+        # Loaded where it is used: with a C compiler it never is.
+        from mrac_design.simulation.llvm_program import llvm_program
+
         self._module = LlvmModule(llvm_program(system, method, input_powers=input_powers))
         entry = ctypes.CFUNCTYPE(ctypes.c_long)(self._module.address("run"))
-        super().__init__(run_entry(entry), outputs=system.outputs.size, powers=input_powers)
+        super().__init__(run_entry(entry), system, powers=input_powers)
 
 
 def run_entry(address: Any) -> Any:
     """The foreign function `run` of a generated program, ready to be called."""
     address.restype = ctypes.c_long
-    address.argtypes = [ctypes.c_long] + 12 * [ctypes.c_void_p]
     return address
 
 
 def run_part(entry: Any, schedule: Schedule, part: slice, *arrays: FloatArray) -> int:
     """Run part of a schedule on a generated program; returns how many records it met.
 
-    `arrays` are coefficients, parameters, state, held memory and the records or accumulators;
-    state, memory and the last are written.
+    `arrays` are coefficients, parameters, state, held memory, the records or accumulators and,
+    where the program has one, the log; all but the first two are written.
     """
     intervals = [
         np.ascontiguousarray(values[part])
@@ -143,23 +161,28 @@ def run_part(entry: Any, schedule: Schedule, part: slice, *arrays: FloatArray) -
         )
     ]  # fmt: skip
     assert all(array.flags.c_contiguous for array in arrays)
-    pointers = (array.ctypes.data for array in (*intervals, *arrays))
-    return int(entry(intervals[0].size, *pointers))
+    pointers = (ctypes.c_void_p(array.ctypes.data) for array in (*intervals, *arrays))
+    return int(entry(ctypes.c_long(intervals[0].size), *pointers))
+
+
+def empty_log(schedule: Schedule, part: slice) -> FloatArray:
+    """A log for two events a step and some besides; more are too many."""
+    capacity = 2 * int(schedule.substeps[part].sum()) + 128
+    log = np.empty((1 + capacity, 3))
+    log[0] = 0.0, capacity, 0.0
+    return log
 
 
 class InterpretedEngine:
     """CasADi's own machine, the last resort: the same operations, but none fused."""
 
     def __init__(self, system: HybridSystem, method: Method, *, input_powers: int) -> None:
+        # Loaded where it is used: with a C compiler or LLVM it never is.
+        from mrac_design.simulation.interpretation import Interpreter
+
         self.name = "CasADi interpreter"
         self.spanning = False
-        self._outputs = system.outputs.size
-        rate, output = prepare(system.rate), prepare(system.output)
-        self._rate_setup = casadi_function(rate.setup, "rate_setup")
-        self._output_setup = casadi_function(output.setup, "output_setup")
-        self._output = casadi_function(finished(output.body), "output")
-        self._update = simplified(system.update) if system.update is not None else None
-        self._step = casadi_function(step_program(system, rate, method, input_powers), "step")
+        self._interpreter = Interpreter(system, method, input_powers=input_powers)
 
     def run(
         self,
@@ -169,32 +192,8 @@ class InterpretedEngine:
         parameters: FloatArray,
         state: FloatArray,
         held: FloatArray,
-    ) -> FloatArray:
-        x, z, nothing = ca.DM(state), ca.DM(held), ca.DM()
-        prepared = self._rate_setup(nothing, nothing, nothing, parameters)
-        ready = self._output_setup(nothing, nothing, nothing, parameters)
-        rows = []
-        for i in range(*part.indices(schedule.length.size)):
-            segment = coefficients[schedule.segment[i]]
-            if schedule.updates[i] or schedule.records[i]:
-                inputs = _polynomial(segment, schedule.offset[i])
-                if schedule.updates[i] and self._update is not None:
-                    z = self._update(x, z, inputs, parameters)
-                if schedule.records[i]:
-                    rows.append(self._output(x, z, inputs, parameters, ready).full().ravel())
-            flat = ca.DM(segment.ravel())
-            h = schedule.length[i] / schedule.substeps[i]
-            for j in range(schedule.substeps[i]):
-                time, rest = schedule.offset[i] + j * h, h
-                while rest > 0:
-                    x, used = self._step(x, z, flat, time, rest, parameters, prepared)
-                    time, rest = time + float(used), rest - float(used)
-        state[:], held[:] = x.full().ravel(), z.full().ravel()
-        return np.array(rows).reshape(len(rows), self._outputs)
-
-
-def _polynomial(coefficients: FloatArray, s: float) -> FloatArray:
-    value = coefficients[:, -1]
-    for k in range(coefficients.shape[1] - 2, -1, -1):
-        value = value * s + coefficients[:, k]
-    return value
+    ) -> Records:
+        outputs, events = self._interpreter.run(
+            schedule, part, coefficients, parameters, state, held
+        )
+        return Records(outputs=outputs, events=events)

@@ -16,6 +16,7 @@ from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import FIRST_COMPLETED, ThreadPoolExecutor, wait
 from dataclasses import dataclass
 from functools import lru_cache
+from importlib.metadata import version
 from itertools import islice
 from typing import Protocol
 
@@ -33,7 +34,7 @@ from mrac_design.simulation.program import c_program
 from mrac_design.simulation.reduction import Reduction
 from mrac_design.simulation.run import Progress, RunSettings
 from mrac_design.simulation.schedule import build_schedule
-from mrac_design.simulation.store import EnsembleStore
+from mrac_design.simulation.store import EnsembleStore, StoredEnsemble
 from mrac_design.simulation.system import HybridSystem
 
 _LOG = logging.getLogger(__name__)
@@ -171,18 +172,22 @@ def run_ensemble(
     """All runs of an ensemble, on threads of this machine unless `workers` says otherwise.
 
     With a `store`, finished chunks are kept there, and those already there are not run again.
-    Raises EnsembleError when the store is another ensemble's, SimulationError and the system's
-    own errors as single runs do.
+    Raises EnsembleError when the store is another ensemble's or damaged, SimulationError and the
+    system's own errors as single runs do.
     """
     workers = workers or LocalThreads()
     table = np.full((ensemble.runs, len(ensemble.reduction.metrics)), np.nan)
     missing = list(range(ensemble.chunks))
     if store is not None:
         store.open(
-            fingerprint=ensemble.fingerprint(),
-            metrics=ensemble.reduction.metrics,
-            runs=ensemble.runs,
-            chunk=ensemble.chunk,
+            StoredEnsemble(
+                fingerprint=ensemble.fingerprint(),
+                version=version("mrac-design"),
+                runs=ensemble.runs,
+                seed=ensemble.seed,
+                chunk=ensemble.chunk,
+                metrics=ensemble.reduction.metrics,
+            )
         )
         kept = store.finished()
         missing = [number for number in missing if number not in kept]

@@ -123,7 +123,7 @@ class RecordingEngine:
             coefficients = np.ascontiguousarray(_by_segment(case.inputs, self._powers))
             outputs = self._engine.run(
                 schedule, slice(None), coefficients, case.parameters, state, held
-            )
+            ).outputs
             sums = fold(self._reduction.initial, outputs.T, times[None, :])[:, -1]
             rows.append(_judged(ca.DM(sums).full().T, state[None, :]))
         return np.vstack(rows)

@@ -52,4 +52,4 @@ def force_loop_trajectory(loop: ForceLoop, recording: Recording, *, engine: str)
         labels=tuple(f"{axis} {name}" for axis in robot.force_axes for name in names),
         description="adapted gains, scaled to order one",
     )
-    return Trajectory(time=recording.time, signals=signals, engine=engine)
+    return Trajectory(time=recording.time, signals=signals, engine=engine, events=recording.events)

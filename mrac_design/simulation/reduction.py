@@ -57,10 +57,9 @@ def tracking_reduction(outputs: Layout, *, settling: float) -> Reduction:
     Metrics: `max_force_error[i]` and `rms_force_error[i]` of |force − desired force|,
     `max_model_error[i]` of |force − model force| (N), `max_effort[j]` (N·m or N).
     """
-    y, now = outputs.symbols("output"), ca.SX.sym("time")
-    signals = outputs.split(y)
+    signals = outputs.split(outputs.symbols("output"))
     axes, efforts = signals["force"].numel(), signals["effort"].numel()
-    layout = Layout(
+    sums = Layout(
         (
             ("max_force_error", axes),
             ("square_sum", axes),
@@ -68,22 +67,6 @@ def tracking_reduction(outputs: Layout, *, settling: float) -> Reduction:
             ("max_model_error", axes),
             ("max_effort", efforts),
         )
-    )
-    a = layout.symbols("accumulators")
-    before = layout.split(a)
-    error = signals["force"] - signals["desired_force"]
-    counts = now >= settling
-    following = layout.join(
-        {
-            "max_force_error": ca.fmax(before["max_force_error"], counts * ca.fabs(error)),
-            "square_sum": before["square_sum"] + counts * error**2,
-            "count": before["count"] + counts,
-            "max_model_error": ca.fmax(
-                before["max_model_error"],
-                counts * ca.fabs(signals["force"] - signals["model_force"]),
-            ),
-            "max_effort": ca.fmax(before["max_effort"], ca.fabs(signals["effort"])),
-        }
     )
     metrics = Layout(
         (
@@ -93,17 +76,37 @@ def tracking_reduction(outputs: Layout, *, settling: float) -> Reduction:
             ("max_effort", efforts),
         )
     )
-    finished = metrics.join(
+    return Reduction(
+        initial=np.zeros(sums.size),
+        fold=_tracking_fold(sums, outputs, settling),
+        finish=_tracking_finish(sums, metrics),
+        metrics=metrics.entry_names,
+    )
+
+
+def _tracking_fold(sums: Layout, outputs: Layout, settling: float) -> ca.Function:
+    a, y, now = sums.symbols("accumulators"), outputs.symbols("output"), ca.SX.sym("time")
+    before, signals = sums.split(a), outputs.split(y)
+    error = signals["force"] - signals["desired_force"]
+    model_error = signals["force"] - signals["model_force"]
+    counts = now >= settling
+    following = sums.join(
         {
-            "max_force_error": before["max_force_error"],
-            "rms_force_error": ca.sqrt(before["square_sum"] / ca.fmax(before["count"], 1)),
-            "max_model_error": before["max_model_error"],
-            "max_effort": before["max_effort"],
+            "max_force_error": ca.fmax(before["max_force_error"], counts * ca.fabs(error)),
+            "square_sum": before["square_sum"] + counts * error**2,
+            "count": before["count"] + counts,
+            "max_model_error": ca.fmax(before["max_model_error"], counts * ca.fabs(model_error)),
+            "max_effort": ca.fmax(before["max_effort"], ca.fabs(signals["effort"])),
         }
     )
-    return Reduction(
-        initial=np.zeros(layout.size),
-        fold=ca.Function("fold", [a, y, now], [following]),
-        finish=ca.Function("finish", [a], [finished]),
-        metrics=metrics.entry_names,
+    return ca.Function("fold", [a, y, now], [following])
+
+
+def _tracking_finish(sums: Layout, metrics: Layout) -> ca.Function:
+    a = sums.symbols("accumulators")
+    total = sums.split(a)
+    mean_square = total["square_sum"] / ca.fmax(total["count"], 1)
+    largest = {name: total[name] for name in ("max_force_error", "max_model_error", "max_effort")}
+    return ca.Function(
+        "finish", [a], [metrics.join({**largest, "rms_force_error": ca.sqrt(mean_square)})]
     )

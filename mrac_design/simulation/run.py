@@ -13,8 +13,9 @@ from mrac_design.arrays import FloatArray, readonly
 from mrac_design.errors import SimulationError
 from mrac_design.motion.signal import PiecewisePolynomial
 from mrac_design.simulation.engine import Engine
-from mrac_design.simulation.schedule import build_schedule
+from mrac_design.simulation.schedule import Schedule, build_schedule
 from mrac_design.simulation.system import HybridSystem
+from mrac_design.simulation.trajectory import Occurrence
 
 Progress = Callable[[float], None]
 """Called with the finished fraction of a run, 0 to 1; may raise to cancel it."""
@@ -45,6 +46,10 @@ class Recording:
     """Outputs in the system's layout, shape (N, outputs.size)."""
     final_state: FloatArray
     """State at the end of the run, shape (state.size,)."""
+    final_held: FloatArray
+    """Held memory at the end of the run, shape (held.size,): where another run goes on."""
+    events: tuple[Occurrence, ...] = ()
+    """Events met, in order of time."""
 
 
 def run(
@@ -61,7 +66,8 @@ def run(
     """Integrate `system` on `engine` from `initial_state` under `inputs`.
 
     `initial_held` is the memory before the first update; without it the memory starts at zero.
-    Raises SimulationError, naming the instant, when a recorded output is no longer finite.
+    Raises SimulationError, naming the instant, when a recorded output is no longer finite or
+    events follow one another without end.
     """
     schedule = build_schedule(
         inputs,
@@ -77,24 +83,51 @@ def run(
         held[:] = initial_held
     time = schedule.start[schedule.records]
     rows: list[FloatArray] = []
-    parts = max(1, int(schedule.substeps.sum()) // _PART)
-    beginnings = np.append(np.flatnonzero(schedule.substeps), schedule.length.size)
-    edges = beginnings[np.linspace(0, beginnings.size - 1, parts + 1).astype(int)]
-    for first, last in pairwise(edges):
-        rows.append(engine.run(schedule, slice(first, last), coefficients, parameters, state, held))
+    events: list[Occurrence] = []
+    for first, last in pairwise(_edges(schedule)):
+        records = engine.run(schedule, slice(first, last), coefficients, parameters, state, held)
+        rows.append(records.outputs)
+        events += _occurrences(system, records.events)
         _require_finite(rows, time, state)
         if progress is not None:
             progress(last / schedule.length.size)
     # Records are megabytes: no copy of what is already whole.
     outputs = rows[0] if len(rows) == 1 else np.vstack(rows)
     outputs.setflags(write=False)
-    return Recording(time=readonly(time), outputs=outputs, final_state=readonly(state))
+    return Recording(
+        time=readonly(time),
+        outputs=outputs,
+        final_state=readonly(state),
+        final_held=readonly(held),
+        events=tuple(events),
+    )
+
+
+def _edges(schedule: Schedule) -> NDArray[np.int64]:
+    """Intervals that parts of a run begin with, and the end; none cuts a step."""
+    parts = max(1, int(schedule.substeps.sum()) // _PART)
+    beginnings = np.append(np.flatnonzero(schedule.substeps), schedule.length.size)
+    return beginnings[np.linspace(0, beginnings.size - 1, parts + 1).astype(int)]
+
+
+def _occurrences(system: HybridSystem, rows: FloatArray) -> list[Occurrence]:
+    found: list[Occurrence] = []
+    for time, number, mode in rows.tolist():
+        if number < 0:
+            last = f" ({found[-1].event.name} {found[-1].change})" if found else ""
+            raise SimulationError(
+                f"too many events follow one another near t = {time:.6g} s{last}: the loop "
+                "chatters between two modes and cannot be simulated as it is"
+            )
+        event = system.events[int(number)]
+        found.append(Occurrence(time=time, event=event, rises=mode > 0))
+    return found
 
 
 def _require_finite(rows: list[FloatArray], time: FloatArray, state: FloatArray) -> None:
-    finite: NDArray[np.bool_] = np.logical_and.reduce(np.isfinite(rows[-1]), axis=1)
-    if finite.all() and np.isfinite(state).all():
+    if np.isfinite(rows[-1]).all() and np.isfinite(state).all():
         return
+    finite: NDArray[np.bool_] = np.logical_and.reduce(np.isfinite(rows[-1]), axis=1)
     done = sum(len(part) for part in rows[:-1])
     index = done + (int(np.argmin(finite)) if not finite.all() else len(finite) - 1)
     raise SimulationError(

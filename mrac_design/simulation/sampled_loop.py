@@ -10,7 +10,7 @@ The controller is the very `RobotStep` that is exported; only the plant is integ
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import casadi as ca
 import numpy as np
@@ -28,7 +28,7 @@ from mrac_design.simulation.friction import Friction
 from mrac_design.simulation.readout import force_loop_trajectory
 from mrac_design.simulation.run import Recording
 from mrac_design.simulation.sensor import ForceSensing
-from mrac_design.simulation.system import ARGUMENT_NAMES, HybridSystem
+from mrac_design.simulation.system import ARGUMENT_NAMES, MODES, Event, HybridSystem, Kinks
 from mrac_design.simulation.trajectory import Signal, Trajectory
 
 
@@ -68,10 +68,12 @@ def build_sampled_loop(
     delay: ComputationalDelay,
     sensor: ForceSensing,
     joints: JointSensor,
+    kinks: Kinks = Kinks.LOCATED,
 ) -> SampledForceLoop:
     """Close the loop of the true robot `dynamics` over the true `contact` and `friction`.
 
     The torque is held between samples (zero-order hold) and limited by the drives themselves.
+    Events are the limits of the efforts, met at samples, and, where it can be lost, the contact.
     Raises ParameterError for a contact made for another number of axes, or a controller made for
     other axes or joints than the robot's.
     """
@@ -91,6 +93,8 @@ def build_sampled_loop(
         **joints.values(robot, step.time_domain.period),
     }
     parameters = Layout(tuple((name, int(np.size(value))) for name, value in values.items()))
+    plant = Plant(dynamics=dynamics, contact=contact, friction=friction)
+    events = (*plant.contact_events(), *plant.effort_events()) if kinks is Kinks.LOCATED else ()
     held = Layout(
         (
             ("controller", step.state.size),
@@ -98,14 +102,14 @@ def build_sampled_loop(
             *sensor.memory(axes).blocks,
             *joints.memory(n).blocks,
             *step.signals.blocks,
+            *([(MODES, len(events))] if events else []),
         )
     )
     state = Layout((("joint_position", n), ("joint_velocity", n), *sensor.state(axes).blocks))
     inputs = Layout(
         (("heart", axes), ("reference", axes), ("noise", axes), *contact.inputs(axes).blocks)
     )
-    plant = Plant(dynamics=dynamics, contact=contact, friction=friction)
-    system = _system(plant, step, (sensor, joints), state, held, inputs, parameters)
+    system = _system(plant, step, (sensor, joints), events, state, held, inputs, parameters)
     loop = ForceLoop(
         system=system,
         parameter_values=parameters.pack(values),
@@ -119,6 +123,7 @@ def _system(
     plant: Plant,
     step: RobotStep,
     sensors: tuple[ForceSensing, JointSensor],
+    events: tuple[Event, ...],
     state: Layout,
     held: Layout,
     inputs: Layout,
@@ -150,11 +155,18 @@ def _system(
     )
     # The newest torque enters at the front; the one that acts leaves at the back.
     pipeline = ca.vertcat(torque, memory["pipeline"])[: memory["pipeline"].numel()]
-    effort = saturated(memory["pipeline"][-n:], symbols["drive_limit"])
+    acting = memory["pipeline"][-n:]
+    effort = saturated(acting, symbols["drive_limit"])
+    pushing, functions = force, None
+    if events:
+        margin = symbols["drive_limit"] - ca.fabs(acting)
+        functions = ca.vertcat(plant.contact_functions(states, exogenous, symbols), margin)
+        made = memory[MODES][: len(plant.contact_events())]
+        _, pushing = plant.contact_force(states, exogenous, symbols, made)
     moving = {
         "joint_position": qd,
-        "joint_velocity": plant.acceleration(states, effort, force, symbols),
-        **sensor.rate(states, force, symbols),
+        "joint_velocity": plant.acceleration(states, effort, pushing, symbols),
+        **sensor.rate(states, pushing, symbols),
     }
     recorded = {
         "force": force,
@@ -174,6 +186,7 @@ def _system(
         **reading,
         **seen.memory,
         **step.signals.split(signals),
+        **({MODES: memory[MODES]} if events else {}),
     }
 
     def function(name: str, result: ca.SX, label: str) -> ca.Function:
@@ -190,6 +203,10 @@ def _system(
         output=function("output", outputs.join(recorded), "output"),
         update=function("update", held.join(update), "next_held"),
         sampling_period=step.time_domain.period,
+        events=events,
+        event_functions=None
+        if functions is None
+        else function("event_functions", functions, "events"),
     )
 
 
@@ -247,4 +264,4 @@ def sampled_trajectory(
     signals = dict(plain.signals)
     for name, (unit, text) in added.items():
         signals[name] = Signal(values=outputs[name], unit=unit, labels=axes, description=text)
-    return Trajectory(time=plain.time, signals=signals, engine=engine)
+    return replace(plain, signals=signals)

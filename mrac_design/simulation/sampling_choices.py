@@ -9,7 +9,6 @@ from typing import Any
 from mrac_design.errors import ParameterError
 from mrac_design.motion.signal import PiecewisePolynomial
 from mrac_design.simulation.encoder import Encoder, ExactJoints, JointSensor
-from mrac_design.simulation.sampled_loop import ComputationalDelay
 from mrac_design.simulation.sensor import (
     FineReading,
     ForceSensing,
@@ -107,6 +106,9 @@ class SampledMeasurement:
     def __post_init__(self) -> None:
         if not 0 < self.rate < float("inf"):
             raise ParameterError("rate", self.rate, "must be a finite rate > 0 Hz")
+        # Loaded where it is used: with every loop and engine, of which a choice knows nothing.
+        from mrac_design.simulation.sampled_loop import ComputationalDelay
+
         ComputationalDelay(self.delay)
 
     @property

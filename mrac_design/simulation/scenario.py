@@ -3,12 +3,10 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any, TypeVar
-
-import tomli_w
 
 from mrac_design.controller.adaptation import AdaptationLaw, GradientLaw, NormalisedGradientLaw
 from mrac_design.controller.linearisation import RobotModelError
@@ -246,10 +244,10 @@ def load_scenario(name_or_path: str | Path) -> Scenario:
     )
 
 
-def save_scenario(scenario: Scenario, path: Path) -> None:
+def save_scenario(scenario: Scenario, path: Path, *, remarks: Sequence[str] = ()) -> None:
     """Write a scenario file that `load_scenario` reads back to an equal scenario.
 
-    The file appears whole or not at all.
+    `remarks` are lines of comment at its top. The file appears whole or not at all.
     """
     content = {
         "name": scenario.name,
@@ -273,7 +271,10 @@ def save_scenario(scenario: Scenario, path: Path) -> None:
         "simulation": _entries(scenario.simulation),
     }
     temporary = path.with_suffix(".toml.part")
-    temporary.write_text(tomli_w.dumps(content), encoding="utf-8")
+    comment = "".join(f"# {line}\n" for line in remarks)
+    import tomli_w  # for writing only
+
+    temporary.write_text(comment + tomli_w.dumps(content), encoding="utf-8")
     os.replace(temporary, path)
 
 

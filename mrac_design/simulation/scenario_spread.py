@@ -15,7 +15,7 @@ from mrac_design.motion.signal import PiecewisePolynomial
 from mrac_design.simulation.lanes import Case
 from mrac_design.simulation.sampling_choices import SampledMeasurement
 from mrac_design.simulation.scenario import Scenario
-from mrac_design.simulation.scenario_run import scenario_inputs
+from mrac_design.simulation.scenario_inputs import rest_depth, scenario_inputs
 
 
 class MotionSource(Protocol):
@@ -128,26 +128,20 @@ class ScenarioSpread:
         """Inputs over a motion, the heart where this tissue carries the first reference."""
         if motion not in self._made:
             self._made[motion] = self._nominal_inputs(motion)
-        nominal = self._made[motion]
+        nominal, scenario = self._made[motion], self.scenario
         moved = np.zeros(nominal.channels)
-        moved[: len(self.axes)] = self._depth(self.scenario.stiffness) - self._depth(stiffness)
+        moved[: len(self.axes)] = rest_depth(scenario, scenario.stiffness) - rest_depth(
+            scenario, stiffness
+        )
         return nominal.shifted(moved)
 
     def _nominal_inputs(self, motion: int) -> PiecewisePolynomial:
-        scenario, duration = self.scenario, self.scenario.simulation.duration
-        sampling = scenario.sampling
+        scenario, sampling = self.scenario, self.scenario.sampling
         if isinstance(sampling, SampledMeasurement):
             sensor = replace(sampling.force_sensor, seed=sampling.force_sensor.seed + motion)
             scenario = replace(scenario, sampling=replace(sampling, force_sensor=sensor))
-        made = self.motions.motion(motion, duration)
-        heart = made.displacement.restricted(0.0, duration).selected(self.axes)
-        rest = self.tip - self._depth(scenario.stiffness)
-        reference = scenario.reference.piecewise(duration)
-        return scenario_inputs(scenario, heart.shifted(rest - heart(0.0)[:, 0]), reference)
-
-    def _depth(self, stiffness: float) -> FloatArray:
-        levels = [steps.levels[0] for steps in self.scenario.reference.steps]
-        return self.scenario.contact.build(stiffness).rest_depth(levels)
+        made = self.motions.motion(motion, scenario.simulation.duration)
+        return scenario_inputs(scenario, made, axes=self.axes, tip=self.tip)
 
     def __getstate__(self) -> bytes:
         # Neither shared objects nor flags of arrays are noted (protocol 5 would): equal spreads

@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
 from mrac_design.arrays import FloatArray, readonly
 from mrac_design.errors import ParameterError
@@ -61,15 +62,23 @@ def build_schedule(
     sampling = _multiples(sampling_period, duration) if sampling_period else np.empty(0)
     tolerance = _COINCIDENCE * min(step, record_period, sampling_period or np.inf)
     inside = inputs.breakpoints[(inputs.breakpoints > 0) & (inputs.breakpoints < duration)]
-    stops = np.unique(np.concatenate([[0.0, duration], recording, sampling, inside]))
-    stops = stops[np.concatenate([[True], np.diff(stops) > tolerance])]
-    start, length = stops[:-1], np.diff(stops)
-    segment = np.searchsorted(inputs.breakpoints, start + length / 2, side="right") - 1
+    stops = _distinct([[0.0, duration], recording, sampling, inside], tolerance)
+    if spanning and step > record_period * (1 + 1e-6):
+        borders = _distinct([[0.0, duration], sampling, inside], tolerance)
+        steps = _equal_steps(borders, step)
+        stops = np.sort(np.append(stops, steps[~_among(steps, stops, tolerance)]))
+        first = np.flatnonzero(_among(stops[:-1], steps, tolerance))
+        substeps = np.zeros(stops.size - 1, dtype=np.int64)
+        substeps[first] = 1
+        length = np.diff(stops)
+        length[first] = np.diff(np.append(stops[first], duration))
+    else:
+        length = np.diff(stops)
+        substeps = np.ceil(length / step - 1e-6).astype(np.int64).clip(min=1)
+    start = stops[:-1]
+    middle = start + np.diff(stops) / 2
+    segment = np.searchsorted(inputs.breakpoints, middle, side="right") - 1
     segment = np.clip(segment, 0, inputs.segments - 1)
-    updates = _among(start, sampling, tolerance)
-    substeps = np.ceil(length / step - 1e-6).astype(np.int64).clip(min=1)
-    if spanning:
-        substeps, length = _spans(length, step, segment, updates, substeps)
     return Schedule(
         start=readonly(start),
         length=readonly(length),
@@ -77,30 +86,24 @@ def build_schedule(
         segment=segment.astype(np.int64),
         offset=readonly(np.maximum(start - inputs.breakpoints[segment], 0.0)),
         records=_among(start, recording, tolerance),
-        updates=updates,
+        updates=_among(start, sampling, tolerance),
     )
 
 
-def _spans(
-    length: FloatArray,
-    step: float,
-    segment: NDArray[np.int64],
-    updates: NDArray[np.bool_],
-    substeps: NDArray[np.int64],
-) -> tuple[NDArray[np.int64], FloatArray]:
-    """Joins intervals to steps of at most `step` that no input's breakpoint or update cuts."""
-    # Plain lists: a loop over NumPy's numbers would take longer than the run it prepares.
-    counts, spans = substeps.tolist(), length.tolist()
-    cut = (updates[1:] | (np.diff(segment) != 0)).tolist()
-    limit = step * (1 + 1e-6)
-    first, joined = 0, spans[0]
-    for i in range(1, len(spans)):
-        joined += spans[i]
-        if cut[i - 1] or joined > limit:
-            first, joined = i, spans[i]
-        else:
-            counts[i], spans[first] = 0, joined
-    return np.array(counts, dtype=np.int64), np.array(spans)
+def _distinct(instants: Sequence[ArrayLike], tolerance: float) -> FloatArray:
+    """All of them in order, of such that nearly coincide only the first."""
+    # Not np.unique: it loads all of numpy.ma.
+    ordered = np.sort(np.concatenate([np.asarray(part, dtype=float) for part in instants]))
+    return ordered[np.concatenate([[True], np.diff(ordered) > tolerance])]
+
+
+def _equal_steps(borders: FloatArray, step: float) -> FloatArray:
+    """Beginnings of steps of at most `step` that divide what lies between borders equally."""
+    spans = np.diff(borders)
+    counts = np.ceil(spans / step - 1e-6).astype(np.int64).clip(min=1)
+    whole = np.repeat(np.arange(spans.size), counts)
+    number = np.arange(whole.size) - np.repeat(np.cumsum(counts) - counts, counts)
+    return borders[whole] + number * (spans / counts)[whole]
 
 
 def _multiples(period: float, end: float) -> FloatArray:

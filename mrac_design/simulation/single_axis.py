@@ -18,17 +18,21 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from mrac_design.arrays import FloatArray, readonly
-from mrac_design.controller.step import ControllerStep
+from mrac_design.controller.robot_step import saturated
+from mrac_design.controller.step import ControllerStep, require_domain
 from mrac_design.errors import ParameterError
 from mrac_design.layout import Layout
 from mrac_design.motion.signal import PiecewisePolynomial, stack
 from mrac_design.plant import ForcePlant
+from mrac_design.simulation.closed_loop import limited
 from mrac_design.simulation.engine import Engine, build_engine
 from mrac_design.simulation.run import Progress, Recording, RunSettings, run
-from mrac_design.simulation.system import ARGUMENT_NAMES, HybridSystem
+from mrac_design.simulation.system import ARGUMENT_NAMES, MODES, Event, HybridSystem
 from mrac_design.simulation.tableau import RK4
 from mrac_design.simulation.trajectory import Signal, Trajectory
+from mrac_design.time_domain import Continuous, Discrete
 
+_LIMIT = Event(name="command limit", rising="left", falling="reached")
 _TEXTS = {
     "force": ("N", "contact force"),
     "desired_force": ("N", "desired force, the pre-filtered reference"),
@@ -41,7 +45,7 @@ _TEXTS = {
     "augmented_error": ("N", "augmented error"),
     "adapted_gains": ("1", "adapted gains, scaled to order one"),
     "heart_rate": ("rad/s", "tracked frequency of the periodic motion"),
-    "beat_force": ("N", "estimated part of the beat in the force"),
+    "periodic_force": ("N", "estimated part of beat and breath in the force"),
     "learned_command": ("m/s²", "command learned over the last periods"),
     "disturbance_estimate": ("m/s²", "estimated disturbance, as an equivalent command"),
 }
@@ -74,11 +78,14 @@ def build_axis_loop(
     """The loop with a continuous controller.
 
     `velocity_gain` K2 (1/s) and `stiffness` Ks (N/m) are the true ones, `command_limit` (m/s²)
-    is symmetric. Raises ParameterError when one of them is out of range.
+    is symmetric; a finite one is an event. Raises ParameterError when one of them is out of range
+    or the controller is sampled.
     """
+    require_domain(step, Continuous())
     values, parameters, inputs = _common(step, velocity_gain, stiffness, command_limit)
     state = Layout((("position", 1), ("velocity", 1), ("controller", step.state.size)))
-    held = Layout(())
+    limits = math.isfinite(command_limit)
+    held = Layout(((MODES, 1),) if limits else ())
     x, z, v, p = (
         state.symbols("state"),
         held.symbols("held"),
@@ -91,15 +98,25 @@ def build_axis_loop(
     applied, following, signal = _controlled(
         step, states["controller"], measured, exogenous, p, parameters
     )
-    acceleration = applied - symbols["velocity_gain"] * states["velocity"]
     recorded = {
         **_recorded(states, exogenous, force, measured, applied),
         **step.signals.split(signal),
     }
+    margin = None
+    if limits:
+        command = step.command(
+            states["controller"], measured, exogenous["reference"], symbols["controller"]
+        )
+        margin = symbols["command_limit"] - ca.fabs(command)
+        applied, following, _ = _controlled(
+            step, states["controller"], measured, exogenous, p, parameters, within=z
+        )
+    acceleration = applied - symbols["velocity_gain"] * states["velocity"]
     return _loop(
         step, state, held, inputs, parameters, values, recorded,
         arguments=[x, z, v, p],
         rate=ca.vertcat(states["velocity"], acceleration, following),
+        margin=margin,
     )  # fmt: skip
 
 
@@ -115,9 +132,11 @@ def build_sampled_axis_loop(
     """The loop with a controller sampled every `period` s, its command held in between.
 
     A command computed from the measurement of instant k acts from instant k + `delay` on; the
-    controller knows its own limited command at once. Other arguments as `build_axis_loop`.
+    controller knows its own limited command at once. Other arguments as `build_axis_loop`, but
+    the controller must be sampled with the same period.
     """
     _check_sampling(period, delay)
+    require_domain(step, Discrete(period))
     values, parameters, inputs = _common(step, velocity_gain, stiffness, command_limit)
     state = Layout((("position", 1), ("velocity", 1)))
     held = _sampled_memory(step, int(delay))
@@ -223,7 +242,8 @@ def resting_axis(loop: AxisLoop, *, force: float, heart: float) -> tuple[FloatAr
     settled = loop.step.equilibrium(force, loop.step.parameter_values).full().ravel()
     plant = {"position": heart + force / stiffness, "velocity": 0.0}
     if loop.system.update is None:
-        return readonly(loop.system.state.pack({**plant, "controller": settled})), readonly([])
+        held = np.ones(loop.system.held.size)  # its modes: within the limits
+        return readonly(loop.system.state.pack({**plant, "controller": settled})), readonly(held)
     memory = {"controller": settled, "pipeline": 0.0, "measured": force, "signals": 0.0}
     return readonly(loop.system.state.pack(plant)), readonly(loop.system.held.pack(memory))
 
@@ -272,7 +292,7 @@ def axis_trajectory(loop: AxisLoop, recording: Recording, *, engine: str) -> Tra
             name if values.shape[1] == 1 else f"{name} {i}" for i in range(values.shape[1])
         )
         signals[name] = Signal(values=values, unit=unit, labels=labels, description=text)
-    return Trajectory(time=recording.time, signals=signals, engine=engine)
+    return Trajectory(time=recording.time, signals=signals, engine=engine, events=recording.events)
 
 
 def _common(
@@ -300,12 +320,16 @@ def _controlled(
     exogenous: dict[str, ca.SX],
     p: ca.SX,
     parameters: Layout,
+    within: ca.SX | None = None,
 ) -> tuple[ca.SX, ca.SX, ca.SX]:
-    """Applied command, what the controller's state advances to, and its signals."""
+    """Applied command, what the controller's state advances to, and its signals.
+
+    `within` says whether the command is taken to be within its limits (1), or beyond them (0).
+    """
     symbols = parameters.split(p)
     own, limit, reference = symbols["controller"], symbols["command_limit"], exogenous["reference"]
     command = step.command(state, measured, reference, own)
-    applied = ca.fmax(ca.fmin(command, limit), -limit)
+    applied = saturated(command, limit) if within is None else limited(command, limit, within)
     events = [exogenous["events"]] if step.events.size else []
     following, signal = step.advance(state, measured, reference, applied, own, *events)
     return applied, following, signal
@@ -341,6 +365,7 @@ def _loop(
     rate: ca.SX,
     update: ca.SX | None = None,
     period: float | None = None,
+    margin: ca.SX | None = None,
 ) -> AxisLoop:
     outputs = Layout(tuple((name, value.numel()) for name, value in recorded.items()))
 
@@ -357,5 +382,7 @@ def _loop(
         output=function("output", outputs.join(recorded), "output"),
         update=None if update is None else function("update", update, "next_held"),
         sampling_period=period,
+        events=() if margin is None else (_LIMIT,),
+        event_functions=None if margin is None else function("event_functions", margin, "events"),
     )
     return AxisLoop(system=system, parameter_values=parameters.pack(values), step=step)

@@ -145,13 +145,6 @@ def augmented_error_argument(
 
 def certified_loop(certificate: StabilityCertificate) -> TheoremCoverage:
     """What the common Lyapunov function of a certificate asks for, and what it gives."""
-    sampled = isinstance(certificate.timing, Sampling)
-    timing = (
-        f"sampled at {to_float(1 / certificate.timing.period):.6g} Hz, delay of "
-        f"{certificate.timing.delay} periods, as the processor runs it"
-        if isinstance(certificate.timing, Sampling)
-        else "the law runs in continuous time"
-    )
     low, high = (
         to_float(ratio * certificate.loop.design_stiffness)
         for ratio in certificate.box.stiffness_ratio
@@ -170,11 +163,7 @@ def certified_loop(certificate: StabilityCertificate) -> TheoremCoverage:
             status=Status.ASSUMED,
             evidence=f"{low:.6g} to {high:.6g} N/m, as stated by the engineer",
         ),
-        Hypothesis(
-            name="sampling",
-            status=Status.PROVED if sampled else Status.ASSUMED,
-            evidence=timing,
-        ),
+        _timing(certificate),
         Hypothesis(
             name="each axis linearised to Ẍ = u − K2 Ẋ",
             status=Status.ASSUMED,
@@ -193,6 +182,20 @@ def certified_loop(certificate: StabilityCertificate) -> TheoremCoverage:
             "heart motion"
         ),
         hypotheses=hypotheses,
+    )
+
+
+def _timing(certificate: StabilityCertificate) -> Hypothesis:
+    timing = certificate.timing
+    if not isinstance(timing, Sampling):
+        return Hypothesis(
+            name="sampling", status=Status.ASSUMED, evidence="the law runs in continuous time"
+        )
+    return Hypothesis(
+        name="sampling",
+        status=Status.PROVED,
+        evidence=f"sampled at {to_float(1 / timing.period):.6g} Hz, delay of {timing.delay} "
+        "periods, as the processor runs it",
     )
 
 

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from mrac_design.comparison.conditions import condition_set
-from mrac_design.comparison.setting import Condition, of_degree
+from mrac_design.comparison.setting import Condition, Periods, of_degree
 from mrac_design.errors import MotionFileError, ParameterError
 from mrac_design.motion import constant_force, find_model
 from mrac_design.simulation.scenario import MotionChoice
@@ -38,7 +38,7 @@ def test_frames_601_to_750_are_held_back(recorded):
 
 def test_beats_of_a_recording_are_found(recorded):
     model = find_model("heart_invivo_fit")
-    assert recorded.training.beat_period == pytest.approx(model.rhythm.mean_period, rel=0.05)
+    assert recorded.training.periods.beat == pytest.approx(model.rhythm.mean_period, rel=0.05)
     # The phase a beat is said to begin at is another than the model's, but stays the same.
     found, true = recorded.training.beats[3:15], model.onsets(30.0)
     lag = np.array([instant - true[true <= instant][-1] for instant in found])
@@ -62,7 +62,7 @@ def test_a_model_is_held_back_by_its_random_numbers(conditions):
 
 def test_strangers_are_what_their_names_say(conditions):
     named = {c.name: c for c in conditions.judged}
-    assert named["fast"].beat_period == 0.5
+    assert named["fast"].periods.beat == 0.5
     intervals = np.diff(named["ectopic"].beats)
     short = named["ectopic"].beats[int(np.argmin(intervals))]
     assert intervals.min() == pytest.approx(0.65 * 0.8)
@@ -81,7 +81,7 @@ def test_ages_start_where_the_last_beat_would_be(conditions):
     heart, reference = condition.heart, constant_force(1.0).piecewise(condition.duration)
     given = Condition(
         name="x", title="x", heart=heart, reference=reference, beats=np.array([0.3, 1.2]),
-        beat_period=0.9, stiffness_factor=1.0, settling=1.0,
+        periods=Periods(beat=0.9, breath=4.0), stiffness_factor=1.0, settling=1.0,
     )  # fmt: skip
     assert np.allclose(given.beat_age()([0.0, 0.2, 0.4, 1.3])[0], [0.6, 0.8, 0.1, 0.1])
 

@@ -14,10 +14,11 @@ from mrac_design.comparison.bench import (
 )
 from mrac_design.comparison.comparison import contestants
 from mrac_design.comparison.contestant import TuningParameter
+from mrac_design.comparison.setting import Periods
 from mrac_design.errors import ParameterError
 
 ALL = {contestant.name: contestant for contestant in contestants()}
-BEAT = 0.5
+PERIODS = Periods(beat=0.5, breath=4.0)
 QUICK = [name for name in ALL if name not in ("learning", "gpc", "preview", "integral")]
 
 
@@ -26,7 +27,7 @@ def test_every_tuning_vector_is_a_controller(name, setting):
     contestant = ALL[name]
     random = np.random.default_rng(0)
     for position in (contestant.position(contestant.start), random.random(contestant.start.size)):
-        axis = contestant.build(setting, BEAT, contestant.values(position))
+        axis = contestant.build(setting, PERIODS, contestant.values(position))
         assert np.isfinite(
             axis.step.parameter_values[np.isfinite(axis.step.parameter_values)]
         ).all()
@@ -50,9 +51,29 @@ def test_equations_do_not_depend_on_the_tuning(name, setting):
     texts = set()
     for share in (0.4, 0.6):
         values = contestant.values(np.full(contestant.start.size, share))
-        step = contestant.build(setting, BEAT, values).step
+        step = contestant.build(setting, PERIODS, values).step
         texts.add(step.command.serialize() + step.advance.serialize())
     assert len(texts) == 1
+
+
+def test_the_motion_predictor_uses_the_breath_it_is_told(specification, conditions):
+    """With a slow disturbance too stiff to carry the breathing, its rhythm has to."""
+    contestant, condition = ALL["gpc"], conditions.training
+    values = np.array(contestant.start)
+    values[6], values[7] = 1e-3, 1e-3  # slow drive (m/s²), breath drive (N)
+    setting, true = specification.setting, condition.periods
+    bench = Bench(setting)
+    told, misled = (
+        root_mean_square(
+            bench.force_error(
+                contestant.build(setting, replace(true, breath=breath), values),
+                condition,
+                Sensing.perfect(),
+            )
+        )
+        for breath in (true.breath, 0.61 * true.breath)
+    )
+    assert told < 0.9 * misled
 
 
 def test_names_are_unique_and_the_frozen_one_leads():
@@ -61,7 +82,7 @@ def test_names_are_unique_and_the_frozen_one_leads():
 
 
 def test_readings_are_multiples_of_the_resolution(setting):
-    axis = ALL["frozen"].build(setting, BEAT, ALL["frozen"].start)
+    axis = ALL["frozen"].build(setting, PERIODS, ALL["frozen"].start)
     coarse = with_quantised_force(axis.step, 0.005)
     state = axis.step.equilibrium(1.0, axis.step.parameter_values)
     for force, reading in ((1.0024, 1.0), (1.0026, 1.005), (-0.0126, -0.015)):
@@ -71,7 +92,7 @@ def test_readings_are_multiples_of_the_resolution(setting):
 
 
 def test_a_fine_resolution_is_none(setting):
-    axis = ALL["mrac_bias"].build(setting, BEAT, ALL["mrac_bias"].start)
+    axis = ALL["mrac_bias"].build(setting, PERIODS, ALL["mrac_bias"].start)
     fine = with_quantised_force(axis.step, FINE)
     state = axis.step.equilibrium(1.0, axis.step.parameter_values)
     found = fine.advance(state, 1.234, 1.0, 0.1, fine.parameter_values)[0]
@@ -85,7 +106,7 @@ def test_the_bench_tells_tunings_apart_without_compiling_again(setting, short):
     errors = [
         root_mean_square(
             bench.force_error(
-                contestant.build(setting, 1.0, contestant.values(np.array(position))),
+                contestant.build(setting, PERIODS, contestant.values(np.array(position))),
                 short,
                 Sensing.of(setting, 0),
             )
@@ -99,7 +120,7 @@ def test_the_bench_tells_tunings_apart_without_compiling_again(setting, short):
 def test_velocity_gain_and_stiffness_reach_the_plant(setting, short):
     """With noise and motion as they are, a stiffer tissue and another K2 change the force."""
     bench, contestant = Bench(setting=setting), ALL["frozen_inverse"]
-    axis = contestant.build(setting, 1.0, contestant.start)
+    axis = contestant.build(setting, PERIODS, contestant.start)
     sensing = Sensing.of(setting, 0)
     base = bench.force_error(axis, short, sensing)
     stiffer = replace(short, stiffness_factor=1.5)

@@ -9,10 +9,12 @@ from mrac_design.comparison.bench import Bench, Sensing, root_mean_square
 from mrac_design.comparison.comparison import contestants
 from mrac_design.comparison.judging import LOST, Measured, judge
 from mrac_design.comparison.rst_contestants import box_is_certified, rst_design
+from mrac_design.comparison.setting import Periods
 from mrac_design.comparison.tuning import BASE_SHARE, tune
 from mrac_design.errors import ParameterError
 
 ALL = {contestant.name: contestant for contestant in contestants()}
+PERIODS = Periods(beat=1.0, breath=5.0)
 
 
 @pytest.fixture(scope="module")
@@ -25,7 +27,7 @@ def test_the_budget_is_spent_and_no_more(bench, short):
     tuning = tune(ALL["observer"], bench, short, budget=20, seed=0, progress=shares.append)
     assert tuning.evaluations == len(shares) == 20
     assert shares[-1] == 1.0
-    start = ALL["observer"].build(bench.setting, 1.0, ALL["observer"].start)
+    start = ALL["observer"].build(bench.setting, PERIODS, ALL["observer"].start)
     sensing = Sensing.of(bench.setting, 0)
     first = root_mean_square(bench.force_error(start, short, sensing))
     assert tuning.admissible
@@ -66,9 +68,9 @@ def test_a_law_that_adapts_is_tuned_after_the_controller_it_adapts(bench, short)
     contestant = ALL["mrac_resonant"]
     tried = []
 
-    def recorded(setting, beat, values):
+    def recorded(setting, periods, values):
         tried.append(values)
-        return contestant.build(setting, beat, values)
+        return contestant.build(setting, periods, values)
 
     budget = 48
     tune(replace(contestant, build=recorded, proof=None), bench, short, budget=budget, seed=0)

@@ -182,6 +182,10 @@ def test_parts_that_do_not_fit_are_refused():
     domain = Discrete(1e-3)
     with pytest.raises(ParameterError, match="one per force axis: X, Y"):
         build_robot_step(dynamics, linearisation, [controller_of(domain)], time_domain=domain)
+    with pytest.raises(ParameterError, match=r"sampled every 0\.002 s.*every 0\.001 s"):
+        build_robot_step(
+            dynamics, linearisation, [controller_of(Discrete(2e-3))] * 2, time_domain=domain
+        )
     with pytest.raises(ParameterError, match=r"axis X.*is continuous"):
         build_robot_step(
             dynamics, linearisation, [controller_of(Continuous())] * 2, time_domain=domain

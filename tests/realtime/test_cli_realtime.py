@@ -6,16 +6,13 @@ import json
 import xml.etree.ElementTree as ElementTree
 
 import pytest
-import typer
-from typer.testing import CliRunner
+from click.testing import CliRunner
 
 from mrac_design.cli.realtime import realtime
 from mrac_design.errors import FileError, ParameterError
+from mrac_design.export.c_expressions import DOUBLE, FLOAT
 from mrac_design.simulation.scenario import save_scenario
 from tests.realtime.small_scenario import small_scenario
-
-APP = typer.Typer()
-APP.command()(realtime)
 
 
 @pytest.fixture
@@ -33,7 +30,7 @@ def finished(report, monkeypatch):
 
 
 def run(*words: str) -> str:
-    result = CliRunner().invoke(APP, words, catch_exceptions=False)
+    result = CliRunner().invoke(realtime, words, catch_exceptions=False)
     assert result.exit_code == 0, result.output
     return result.stdout
 
@@ -60,7 +57,7 @@ def test_default_is_two_seconds_at_three_rates(finished, report):
     text = run()
     (scenario, choices), *_ = finished
     assert scenario.simulation.duration == 2.0
-    assert choices == {"rates": [1000.0, 2000.0, 4000.0], "delay": None}
+    assert choices == {"rates": [1000.0, 2000.0, 4000.0], "delay": None, "number": DOUBLE}
     assert "bit for bit" in text
     assert "real-time priority" in text
     assert f"measured on {report.machine}" in text
@@ -69,11 +66,22 @@ def test_default_is_two_seconds_at_three_rates(finished, report):
 
 
 def test_options_reach_the_run(finished):
-    run("--rates", "500,2500", "--duration", "0.25", "--delay", "0", "--gain", "0.5")
+    run(
+        "--rates",
+        "500,2500",
+        "--duration",
+        "0.25",
+        "--delay",
+        "0",
+        "--gain",
+        "0.5",
+        "--real",
+        "float",
+    )
     ((scenario, choices),) = finished
     assert scenario.simulation.duration == 0.25
     assert scenario.adaptation.gain == 0.5
-    assert choices == {"rates": [500.0, 2500.0], "delay": 0}
+    assert choices == {"rates": [500.0, 2500.0], "delay": 0, "number": FLOAT}
 
 
 def test_bad_rates_and_folders_get_one_sentence(finished, tmp_path):

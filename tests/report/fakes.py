@@ -6,6 +6,8 @@ from types import SimpleNamespace
 
 import numpy as np
 
+from mrac_design.simulation.scenario import load_scenario
+
 AXES = ("X", "Y", "Z")
 GAINS = ("r1'", "s0", "s1", "t0", "t1", "bias")
 
@@ -13,8 +15,9 @@ GAINS = ("r1'", "s0", "s1", "t0", "t1", "bias")
 class FakeTrajectory:
     """Named signals over a common time, as `mrac_design.simulation.Trajectory`."""
 
-    def __init__(self, time, signals):
+    def __init__(self, time, signals, events=()):
         self.time = time
+        self.events = events
         self.signals = signals
 
     def __getitem__(self, name):
@@ -74,7 +77,7 @@ def fake_study():
     joints = tuple(SimpleNamespace(name=f"joint {i + 1}") for i in range(5))
     heart = trajectories["frozen"]["heart"]
     return SimpleNamespace(
-        scenario=SimpleNamespace(simulation=SimpleNamespace(settling=0.5)),
+        scenario=load_scenario("nominal"),
         robot=SimpleNamespace(
             name="D2M2 stand-in",
             force_axes=AXES,

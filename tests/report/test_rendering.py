@@ -111,6 +111,8 @@ def test_report_is_complete_self_contained_and_in_order(tmp_path, scenario):
     assert not re.search(r"@import|url\((?!['\"]?data:)", html)
     assert "scenario is forty-two" in page.text
     assert "<math" in html
+    assert '<mo accent="true">\N{DOT ABOVE}</mo>' in html  # a combining dot would stand beside θ
+    assert not set(html) & {"\N{COMBINING DOT ABOVE}", "\N{COMBINING DIAERESIS}"}
     assert html.index("First stage</h1>") < html.index("Second stage</h1>")
     assert re.search(r"<td[^>]*>stiffness</td>\s*<td[^>]*>800</td>", html)
     assert re.search(r"<th[^>]*>head</th>", html)

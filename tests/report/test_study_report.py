@@ -10,7 +10,7 @@ from mrac_design.report import gains_figure, study_report
 from mrac_design.report.execution import execute_notebooks
 from mrac_design.report.study_report import REPORT_NOTEBOOKS, write_study_report
 from mrac_design.resources import notebooks_directory
-from mrac_design.simulation.scenario import load_scenario
+from mrac_design.simulation.scenario import load_scenario, save_scenario
 from mrac_design.study import run_study
 
 FILES = {
@@ -69,7 +69,7 @@ def test_paths_given_from_the_working_folder_reach_the_notebooks(tmp_path, nomin
     robot = tmp_path / "my_robot.toml"
     robot.write_text((notebooks_directory().parent / "models/robots/d2m2_set_a.toml").read_text())
     seen = {}
-    monkeypatch.setattr(study_report, "save_figures", lambda study, folder: folder.mkdir())
+    monkeypatch.setattr(study_report, "save_figures", lambda _, folder: folder.mkdir())
     monkeypatch.setattr(study_report, "REPORT_NOTEBOOKS", ())
     monkeypatch.setattr(
         study_report,
@@ -90,10 +90,28 @@ def test_failure_at_any_stage_writes_nothing(tmp_path, nominal, monkeypatch, sta
     monkeypatch.setattr(study_report, "REPORT_NOTEBOOKS", REPORT_NOTEBOOKS[:0])
     short = replace(nominal, simulation=replace(nominal.simulation, duration=0.6))
     if stage == "render_report":
-        monkeypatch.setattr(study_report, "save_figures", lambda study, folder: folder.mkdir())
+        monkeypatch.setattr(study_report, "save_figures", lambda _, folder: folder.mkdir())
     with pytest.raises(MracDesignError, match="seeded"):
         write_study_report(short, tmp_path / "deep" / "out")
     assert list(tmp_path.iterdir()) == []
+
+
+def test_simulation_chapter_knows_tissue_that_steps_and_damps(tmp_path):
+    """The chapter ends with the force recomputed from positions and velocities."""
+    scenario = load_scenario("stiffness_step")
+    short = replace(
+        scenario,
+        contact=replace(scenario.contact, damping=2.0),
+        simulation=replace(scenario.simulation, duration=1.2),  # past the first step, at 1 s
+    )
+    save_scenario(short, tmp_path / "scenario.toml")
+    environment = {"MRAC_SCENARIO": str(tmp_path / "scenario.toml")}
+    path = notebooks_directory() / "03_nominal.py"
+    (notebook,) = execute_notebooks([path], tmp_path, environment, lambda name, done: None)
+    shown = "".join(str(cell.get("outputs", "")) for cell in notebook.cells)
+    assert "All checks passed." in shown
+    assert "[Z] has no simulation under these conditions" in shown
+    assert "[Z] figure" not in shown
 
 
 def test_gains_figure_leaves_out_what_does_not_move(nominal):

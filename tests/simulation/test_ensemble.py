@@ -36,6 +36,20 @@ from tests.simulation.ensemble_problem import pendulums
 pytestmark = pytest.mark.skipif(find_compiler() is None, reason="no C compiler here")
 
 
+SCHEDULER = """
+import sys, time
+from distributed import LocalCluster
+sys.path.insert(0, sys.argv[1])
+cluster = LocalCluster(
+    n_workers=1, threads_per_worker=1, processes=False, dashboard_address=None,
+    protocol="tcp", scheduler_port=0,
+)
+print(cluster.scheduler_address, flush=True)
+time.sleep(60)
+"""
+"""Scheduler and worker in one process, to be killed."""
+
+
 def single_runs(ensemble, engine):
     """The same metrics from ordinary runs and NumPy."""
     rows = []
@@ -178,25 +192,52 @@ def test_fingerprint_is_the_same_in_another_process():
     assert pickle.loads(pickle.dumps(pendulums())).fingerprint() == pendulums().fingerprint()
 
 
-def test_cluster_with_a_worker_killed_gives_the_same_table():
+def test_cluster_with_workers_killed_gives_the_same_table(monkeypatch):
+    """Both die, one after the other: what they were sent once must survive as well."""
     distributed = pytest.importorskip("distributed")
     problem = pendulums(runs=400, chunk=4)
     table = run_ensemble(problem).table
     with distributed.LocalCluster(
         n_workers=2, threads_per_worker=1, processes=True, dashboard_address=None
     ) as cluster:
-        victim = cluster.workers[0].pid
+        victims = [worker.pid for worker in cluster.workers.values()]
+        instants = [0.1, 0.5]
 
-        killed = []
+        def kill(fraction):
+            if instants and fraction > instants[0]:
+                del instants[0]
+                os.kill(victims.pop(), signal.SIGKILL)
 
-        def kill_once(fraction):
-            if fraction > 0.1 and not killed:
-                os.kill(victim, signal.SIGKILL)
-                killed.append(victim)
+        sent = []
+        submit = distributed.Client.submit
 
+        def weighed(client, function, *arguments, **options):
+            sent.extend(len(item) for item in arguments if isinstance(item, bytes))
+            return submit(client, function, *arguments, **options)
+
+        monkeypatch.setattr(distributed.Client, "submit", weighed)
         workers = DaskCluster(address=cluster.scheduler_address)
-        result = run_ensemble(problem, workers=workers, progress=kill_once)
+        result = run_ensemble(problem, workers=workers, progress=kill)
     assert np.array_equal(result.table, table)
+    assert not victims
+    assert sent == [len(pickle.dumps(problem, protocol=5))]
+
+
+def test_scheduler_that_goes_away_is_one_clear_sentence():
+    pytest.importorskip("distributed")
+    server = subprocess.Popen(
+        [sys.executable, "-c", SCHEDULER, str(Path(__file__).parents[2])],
+        stdout=subprocess.PIPE, text=True,
+    )  # fmt: skip
+    address = server.stdout.readline().strip()
+    with pytest.raises(EnsembleError, match=f"{address} went away: start it again") as told:
+        run_ensemble(
+            pendulums(runs=400, chunk=4),
+            workers=DaskCluster(address=address),
+            progress=lambda fraction: server.kill(),
+        )
+    server.wait()
+    assert "\n" not in str(told.value)
 
 
 def test_cluster_that_is_not_there_is_one_clear_sentence():

@@ -20,6 +20,7 @@ from mrac_design.simulation.contact import LinearSpring
 from mrac_design.simulation.engine import InterpretedEngine, build_engine
 from mrac_design.simulation.friction import Frictionless
 from mrac_design.simulation.run import RunSettings, run
+from mrac_design.simulation.system import Kinks
 from mrac_design.simulation.tableau import RK4
 from mrac_design.time_domain import Continuous
 
@@ -38,7 +39,9 @@ def dynamics(request):
     return build_dynamics(load_robot(request.param))
 
 
-def loop_of(dynamics, *, gain=1.0, model_error=None, stiffness=STIFFNESS) -> ForceLoop:
+def loop_of(
+    dynamics, *, gain=1.0, model_error=None, stiffness=STIFFNESS, kinks=Kinks.LOCATED
+) -> ForceLoop:
     linearisation = build_linearisation(
         dynamics,
         velocity_gain=50.0,
@@ -63,6 +66,7 @@ def loop_of(dynamics, *, gain=1.0, model_error=None, stiffness=STIFFNESS) -> For
         [step] * axes,
         contact=LinearSpring(stiffness),
         friction=Frictionless(),
+        kinks=kinks,
     )
 
 
@@ -116,10 +120,11 @@ def test_force_agrees_with_dop853_at_1e_12(dynamics):
     inputs = inputs_of(loop, end=end)
     recording, ours = record(loop, inputs, duration=end)
     rate = loop.system.rate
+    within = np.ones(loop.system.held.size)  # no effort reaches its limit here
 
     def rhs(t, x, left, right):
         t = np.clip(t, left, np.nextafter(right, left))  # the input of this side of the jump
-        return rate(x, [], inputs(t)[:, 0], loop.parameter_values).full().ravel()
+        return rate(x, within, inputs(t)[:, 0], loop.parameter_values).full().ravel()
 
     state, times, states = start_of(loop), [], []
     for left, right in ((0.0, 0.3), (0.3, end)):
@@ -171,7 +176,8 @@ def test_frozen_force_error_is_the_disturbance_sensitivity(dynamics, true_stiffn
 
 
 def test_an_unstable_loop_is_reported_with_its_instant(dynamics):
-    loop = loop_of(dynamics)
+    # Steps that end where an effort meets its limit are short enough to calm it again.
+    loop = loop_of(dynamics, kinks=Kinks.CROSSED)
     with pytest.raises(SimulationError, match="t = "):
         record(loop, inputs_of(loop), step=2e-2)
 

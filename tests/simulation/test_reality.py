@@ -8,10 +8,8 @@ from functools import cache
 import numpy as np
 import pytest
 
-from mrac_design.arrays import readonly
-from mrac_design.controller.adaptive import build_step, nominal_gains
+from mrac_design.controller.adaptive import nominal_gains
 from mrac_design.controller.axis_loop import axis_loop
-from mrac_design.controller.linearisation import build_linearisation
 from mrac_design.controller.robot_step import build_robot_step
 from mrac_design.errors import ParameterError, ScenarioFileError
 from mrac_design.resources import models_directory
@@ -35,8 +33,9 @@ from mrac_design.study import (
     exogenous_inputs,
     run_study,
     scenario_design,
+    scenario_linearisation,
     scenario_motion,
-    variant_controller,
+    variant_step,
 )
 from mrac_design.verdict import Verdict
 
@@ -271,21 +270,11 @@ def untold_run(record: StudyRecord) -> Trajectory:
     """The same run with a controller that thinks its motors know no limit."""
     scenario = record.scenario
     dynamics = build_dynamics(load_robot(scenario.robot))
-    choice = scenario.design
-    linearisation = build_linearisation(
-        dynamics,
-        velocity_gain=choice.velocity_gain,
-        tool_axis_bandwidth=choice.tool_axis_bandwidth,
-        model_error=scenario.model_error,
-    )
+    linearisation = scenario_linearisation(scenario, dynamics)
     domain = controller_domain(scenario)
-    controller = replace(
-        variant_controller(scenario, record.design, VARIANTS[2]), time_domain=domain
-    )
-    step = build_step(controller)
+    step = variant_step(scenario, record.design, VARIANTS[2])
     inputs = exogenous_inputs(scenario, dynamics, scenario_motion(scenario))
-    force = readonly(inputs(0.0)[3:6, 0])
-    ready = ready_loop(scenario, dynamics, linearisation, step, force=force)
+    ready = ready_loop(scenario, dynamics, linearisation, step)
     layout = ready.loop.system.parameters
     inner = build_robot_step(dynamics, linearisation, [step] * 3, time_domain=domain).parameters
     values = layout.split(np.array(ready.loop.parameter_values))

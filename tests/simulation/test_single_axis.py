@@ -134,6 +134,10 @@ def test_a_limited_command_reaches_plant_and_controller_limited():
         loop, inputs=inputs, settings=RunSettings(duration=0.1, step=1e-4, record_period=1e-3)
     )
     assert np.abs(run["command"]).max() == 0.5
+    assert run.events[0].change == "reached"
+    # The event stands between the last record within the limit and the first at it.
+    first = int(np.argmax(np.abs(run["command"][:, 0]) == 0.5))
+    assert run.time[first - 1] <= run.events[0].time <= run.time[first]
 
 
 def test_noise_is_white_and_reproducible():
@@ -156,3 +160,5 @@ def test_misuse_is_refused():
         build_sampled_axis_loop(step, velocity_gain=50.0, stiffness=800.0, period=0.0, delay=0)
     with pytest.raises(ParameterError, match="command limit"):
         build_axis_loop(step, velocity_gain=50.0, stiffness=800.0, command_limit=0.0)
+    with pytest.raises(ParameterError, match=r"continuous time.*sampled every 0\.001 s"):
+        build_sampled_axis_loop(step, velocity_gain=50.0, stiffness=800.0, period=1e-3, delay=0)

@@ -146,6 +146,7 @@ def beat_preview_step(specification: BeatPreview) -> ControllerStep:
     resting |= {"estimate": ca.vertcat(force, 0, 0), "prefilter": ca.vertcat(0, force)}
     return assemble_step(
         step,
+        time_domain=specification.time_domain,
         values=parameters.pack(values),
         command=command,
         following=following,

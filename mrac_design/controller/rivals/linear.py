@@ -148,6 +148,7 @@ def build_linear_step(controller: LinearController) -> ControllerStep:
     }
     return assemble_step(
         symbols,
+        time_domain=controller.time_domain,
         values=parameters.pack(
             {**{name: tables[name][at] for name, at in free.items()}, "rest": rest}
         ),

@@ -3,7 +3,8 @@
 Predictive force control [Dominici 2008] is the receding-horizon law with past and current forces
 and Δ = 1 − q⁻¹. Against the heart, the law of [Ginhoux 2005] adds both parts of a motion
 predictor: breathing through Δ = (1 − q⁻¹)(1 − q⁻ᵀ), T samples a breath, and the beat through an
-observer of its harmonics whose forecast the law treats as known.
+observer of its harmonics whose forecast the law treats as known. That observer can take the breath
+too: where T is thousands of samples, its first harmonics keep a state of a few numbers.
 """
 
 from __future__ import annotations
@@ -13,7 +14,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from mrac_design.arrays import readonly
-from mrac_design.controller.rivals.harmonics import BeatObserver, beat_observer_rows
+from mrac_design.controller.rivals.harmonics import RhythmObserver, rhythm_observer_rows
 from mrac_design.controller.rivals.linear import Columns, LinearController
 from mrac_design.controller.rivals.observation import sampled_plant
 from mrac_design.controller.rivals.prediction import ArimaxModel, Horizon, horizon_gains
@@ -37,8 +38,8 @@ class PredictiveControl:
     """Roots of the noise polynomial C, real, |p| < 1; none makes C = 1."""
     breath: int | None
     """Breathing period T in samples, whose motion the model then expects; None leaves it out."""
-    beat: BeatObserver | None
-    """Observer of the beat's harmonics; None leaves the beat unpredicted."""
+    rhythms: RhythmObserver | None
+    """Observer of harmonics of beat and breath; None leaves them unpredicted."""
     prefilter: ReferenceModel
     """Pre-filter Hm that turns force steps into the desired force [Z 5]."""
     time_domain: Discrete
@@ -81,16 +82,16 @@ def predictive_control(specification: PredictiveControl) -> LinearController:
     counted = range(horizon.first, horizon.last + 1)
     target = np.array([reference.desired(ahead=j) for j in counted])
     output, following, signals = columns.force, {"prefilter": reference.following()}, {}
-    if specification.beat is not None:
-        beat = beat_observer_rows(
-            columns, specification.beat, specification.plant, specification.time_domain,
+    if specification.rhythms is not None:
+        periodic = rhythm_observer_rows(
+            columns, specification.rhythms, specification.plant, specification.time_domain,
             delay=model.delay, command=columns.applied,
         )  # fmt: skip
-        # The law sees the force without the beat and aims beside it by the beat to come.
-        output = columns.force - beat.forecast(0)
-        target = target - np.array([beat.forecast(j) for j in counted])
-        following |= beat.following
-        signals = {"beat_force": beat.forecast(0)}
+        # The law sees the force without its rhythms and aims beside it by what is to come of them.
+        output = columns.force - periodic.forecast(0)
+        target = target - np.array([periodic.forecast(j) for j in counted])
+        following |= periodic.following
+        signals = {"periodic_force": periodic.forecast(0)}
 
     outputs, inputs = columns.block("forces"), columns.block("commands")
     registers = {"forces": output, "commands": columns.applied}
@@ -102,8 +103,8 @@ def predictive_control(specification: PredictiveControl) -> LinearController:
     free = model.free_response(np.vstack([output, outputs]), inputs, errors, horizon.last)
     increment = gains @ (target - free[horizon.first - 1 :])
     rest = dict.fromkeys(registers, 0.0) | {"forces": 1.0}
-    if specification.beat is not None:
-        rest["beat_observer"] = np.eye(specification.beat.size)[0]
+    if specification.rhythms is not None:
+        rest["rhythm_observer"] = np.eye(specification.rhythms.size)[0]
     return LinearController(
         time_domain=specification.time_domain,
         columns=columns,
@@ -119,6 +120,6 @@ def _layout(specification: PredictiveControl, model: ArimaxModel) -> Layout:
     blocks = [("forces", model.output_memory), ("commands", model.input_memory)]
     if model.error_memory:
         blocks.append(("errors", model.error_memory))
-    if specification.beat is not None:
-        blocks.append(("beat_observer", specification.beat.size))
+    if specification.rhythms is not None:
+        blocks.append(("rhythm_observer", specification.rhythms.size))
     return Layout((*blocks, PREFILTER))

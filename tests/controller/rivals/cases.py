@@ -12,7 +12,7 @@ from mrac_design.controller.rivals.active_observer import (
 )
 from mrac_design.controller.rivals.beat_preview import BeatPreview, beat_preview_step
 from mrac_design.controller.rivals.fixed_rst import FixedRST, fixed_rst
-from mrac_design.controller.rivals.harmonics import BeatObserver
+from mrac_design.controller.rivals.harmonics import Rhythm, RhythmObserver
 from mrac_design.controller.rivals.learning import IterativeLearning, iterative_learning
 from mrac_design.controller.rivals.linear import build_linear_step
 from mrac_design.controller.rivals.prediction import Horizon
@@ -63,12 +63,13 @@ PREDICTIVE = PredictiveControl(
     horizon=Horizon(first=2, last=15, moves=3, penalty=1e-6),
     observer_poles=(0.8, 0.6),
     breath=None,
-    beat=None,
+    rhythms=None,
     prefilter=PREFILTER,
     time_domain=DOMAIN,
     delay=DELAY,
 )
-BEAT = BeatObserver(frequency=1.25, harmonics=3, drive=1e-2, slow_drive=0.01, force_noise=0.02)
+BEAT = Rhythm(frequency=1.25, harmonics=3, drive=1e-2)
+RHYTHMS = RhythmObserver(rhythms=(BEAT,), slow_drive=0.01, force_noise=0.02)
 PREDICTIVE_OBSERVER = PredictiveObserver(
     plant=PLANT,
     horizon=Horizon(first=1, last=12, moves=2, penalty=1e-6),
@@ -119,7 +120,7 @@ def linear_rivals():
         "two active observers": active_observer(replace(OBSERVER, motion_loop=MOTION_LOOP)),
         "predictive": predictive_control(PREDICTIVE),
         "predictive with breath": predictive_control(replace(PREDICTIVE, breath=100)),
-        "predictive with beat": predictive_control(replace(PREDICTIVE, beat=BEAT)),
+        "predictive with beat": predictive_control(replace(PREDICTIVE, rhythms=RHYTHMS)),
         "predictive observer": predictive_observer(PREDICTIVE_OBSERVER),
         "predictive observer without dead time": predictive_observer(
             replace(PREDICTIVE_OBSERVER, delay=0)

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from scipy.optimize import minimize
 
-from mrac_design.controller.rivals.harmonics import BeatObserver
+from mrac_design.controller.rivals.harmonics import Rhythm
 from mrac_design.controller.rivals.prediction import Horizon, horizon_gains
 from mrac_design.controller.rivals.predictive import predictive_control, predictive_model
 from mrac_design.controller.rivals.predictive_observer import predictive_observer
@@ -19,6 +19,7 @@ from tests.controller.rivals.cases import (
     PERIOD,
     PREDICTIVE,
     PREDICTIVE_OBSERVER,
+    RHYTHMS,
     STIFFNESS,
     VELOCITY_GAIN,
 )
@@ -130,9 +131,31 @@ def test_the_beats_harmonics_disappear_with_their_observer():
     phase = 2 * np.pi * BEAT.frequency * PERIOD * k
     motion = np.sin(phase) + 0.6 * np.cos(2 * phase) + 0.3 * np.sin(3 * phase)
     plain = errors(predictive_control(PREDICTIVE), motion)[-1600:]
-    knowing = errors(predictive_control(replace(PREDICTIVE, beat=BEAT)), motion)[-1600:]
+    knowing = errors(predictive_control(replace(PREDICTIVE, rhythms=RHYTHMS)), motion)[-1600:]
     # What stays is the price λ sets on moving at all.
     assert knowing.std() < 0.15 * plain.std()
+
+
+def test_a_breath_of_thousands_of_samples_disappears_with_its_harmonics():
+    breath = Rhythm(frequency=0.25, harmonics=2, drive=1e-2)
+    assert round(1 / (breath.frequency * PERIOD)) == 4000
+    k = np.arange(60_000)
+    phase = 2 * np.pi * PERIOD * k
+    motion = (
+        4 * np.sin(0.25 * phase) + 2 * np.cos(0.5 * phase)
+        + np.sin(1.25 * phase) + 0.6 * np.cos(2.5 * phase)
+    )  # fmt: skip
+    beat_only, both = (
+        predictive_control(replace(PREDICTIVE, rhythms=replace(RHYTHMS, rhythms=rhythms)))
+        for rhythms in ((BEAT,), (BEAT, breath))
+    )
+    assert both.columns.state.size == beat_only.columns.state.size + 4
+    without, within = (errors(law, motion)[-8000:].std() for law in (beat_only, both))
+    assert within < 0.05 * without
+    # Told a wrong breath, it is no better than without one.
+    wrong = replace(RHYTHMS, rhythms=(BEAT, replace(breath, frequency=0.37)))
+    missed = errors(predictive_control(replace(PREDICTIVE, rhythms=wrong)), motion)[-8000:].std()
+    assert missed > 10 * within
 
 
 def test_nonsense_is_refused():
@@ -146,4 +169,6 @@ def test_nonsense_is_refused():
     with pytest.raises(ParameterError, match="breath"):
         replace(PREDICTIVE, breath=10)
     with pytest.raises(ParameterError, match="harmonics"):
-        BeatObserver(frequency=1.0, harmonics=0, drive=1.0, slow_drive=1.0, force_noise=1.0)
+        Rhythm(frequency=1.0, harmonics=0, drive=1.0)
+    with pytest.raises(ParameterError, match="differ"):
+        replace(RHYTHMS, rhythms=(BEAT, replace(BEAT, frequency=2.5)))
