@@ -29,7 +29,6 @@ from mrac_design.export.gain_document import document_of
 from mrac_design.export.gain_set import GainSet
 from mrac_design.export.writing import written_whole
 from mrac_design.robot import RobotDescription
-from mrac_design.robot.formulas import describe
 
 _LINEARISATION = r"""
 $$\begin{aligned}
@@ -79,7 +78,7 @@ def formulas_markdown(gains: GainSet, robot: RobotDescription) -> str:
             f"first joint times {gains.robot_model.first_joint_scale:.10g}. Other components of "
             f"the task: critically damped PD of {gains.tool_axis_bandwidth:.10g} rad/s.",
             "# Robot",
-            describe(robot),
+            robot._repr_markdown_(),
         )
     )
 
