@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import difflib
 import math
 import tomllib
 from collections.abc import Callable, Mapping
@@ -36,6 +35,8 @@ class Table:
         """Refuse keys outside `known`, then missing ones."""
         for key in self.entries:
             if key not in known:
+                import difflib  # for mistakes only
+
                 close = difflib.get_close_matches(key, known, n=1, cutoff=0.5)
                 hint = f'did you mean "{close[0]}"?' if close else f"known keys: {', '.join(known)}"
                 raise self.error(key, f"unknown key; {hint}")

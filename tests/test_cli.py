@@ -83,9 +83,19 @@ def test_check_model_names_what_the_robot_is(mrac):
     assert mrac("check-model", "planar_2r")[0] == 0
 
 
+def test_an_interruption_is_one_sentence(mrac, monkeypatch):
+    def interrupted(*arguments, **choices):
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr("mrac_design.study.run_study", interrupted)
+    status, text, error = mrac("simulate")
+    assert (status, text) == (130, "")
+    assert error.strip() == "interrupted; nothing half-written was left behind"
+
+
 COMMANDS = (
     "report", "simulate", "design", "check-model", "export", "certify", "verify", "stability",
-    "realtime", "ensemble", "compare",
+    "realtime", "ensemble", "compare", "drift", "paper", "tune",
 )  # fmt: skip
 
 
@@ -131,6 +141,7 @@ def test_a_missing_recording_is_one_clear_error(mrac, tmp_path):
     ("arguments", "names"),
     [
         (("compare", "--motion", "nowhere.csv"), "nowhere.csv"),
+        (("paper", "--motion", "nowhere.csv"), "nowhere.csv"),
         (("stability", "--motion", "nowhere.csv"), "nowhere.csv"),
         (("stability", "--k2", "-1"), "velocity gain K2 = -1"),
     ],

@@ -16,7 +16,8 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from click.testing import CliRunner
+import typer
+from typer.testing import CliRunner
 
 from mrac_design.cli import ensemble as cli_ensemble
 from mrac_design.ensemble_study import EnsembleChoice, prepare_ensemble, run_prepared
@@ -38,11 +39,16 @@ from mrac_design.study import run_study
 pytestmark = pytest.mark.skipif(find_compiler() is None, reason="no C compiler here")
 
 ROOT = Path(__file__).parents[1]
+APP = typer.Typer()
+APP.command()(cli_ensemble.ensemble)
 SMALL_CHUNKS = (
+    "import typer\n"
     "import mrac_design.ensemble_study.preparation as study\n"
     "from mrac_design.cli.ensemble import ensemble\n"
     "study._LARGEST_CHUNK = 8\n"
-    "ensemble()\n"
+    "app = typer.Typer()\n"
+    "app.command()(ensemble)\n"
+    "app()\n"
 )
 """Many pieces of little work, so that a stop finds some of them finished."""
 
@@ -79,7 +85,7 @@ def unillustrated(monkeypatch):
 
 
 def run(*words: str, status: int = 0) -> str:
-    result = CliRunner().invoke(cli_ensemble.ensemble, words, catch_exceptions=False)
+    result = CliRunner().invoke(APP, words, catch_exceptions=False)
     assert result.exit_code == status, result.output
     return result.stdout if status == 0 else result.output
 

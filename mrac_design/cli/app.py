@@ -5,30 +5,47 @@ from __future__ import annotations
 import logging
 import sys
 from pathlib import Path
-from typing import Annotated, Any
+from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
-from rich.logging import RichHandler
-from rich.table import Table
+from typer.core import TyperGroup
 
 from mrac_design.cli.certify import certify, stability, verify
 from mrac_design.cli.compare import compare
-from mrac_design.cli.console import MESSAGES, OUTPUT, print_json, progress_bar
+from mrac_design.cli.console import MessageHandler, messages, output, print_json, progress_bar
+from mrac_design.cli.drift import drift
 from mrac_design.cli.ensemble import ensemble
 from mrac_design.cli.export import export
-from mrac_design.cli.options import DesignOptions, StudyOptions, takes
+from mrac_design.cli.options import DesignOptions, JsonOption, StudyOptions, takes
+from mrac_design.cli.paper import paper
 from mrac_design.cli.realtime import realtime
+from mrac_design.cli.tune import tune
 from mrac_design.errors import MracDesignError
 
+if TYPE_CHECKING:  # loading it takes longer than `--help` should
+    from mrac_design.study import StudyRecord
+
+
+class _Commands(TyperGroup):
+    """The commands; one that is interrupted ends with a sentence and status 130."""
+
+    def invoke(self, ctx: Any) -> Any:
+        """Run the command that was given."""
+        try:
+            return super().invoke(ctx)
+        except KeyboardInterrupt:
+            messages().print("interrupted; nothing half-written was left behind")
+            raise typer.Exit(130) from None
+
+
 app = typer.Typer(
+    cls=_Commands,
     help="Design, certify, simulate and deploy model reference adaptive force control.",
     no_args_is_help=True,
     add_completion=False,
     pretty_exceptions_enable=False,
     rich_markup_mode="rich",
 )
-
-JsonOption = Annotated[bool, typer.Option("--json", help="Print JSON for machines.")]
 
 
 @app.callback()
@@ -38,7 +55,7 @@ def _setup(
     logging.basicConfig(
         level=logging.INFO if verbose else logging.WARNING,
         format="%(message)s",
-        handlers=[RichHandler(console=MESSAGES, show_time=False, show_path=False)],
+        handlers=[MessageHandler()],
     )
 
 
@@ -58,12 +75,11 @@ def report(
 
     with progress_bar("report") as progress:
         study = write_study_report(options.chosen(), out, progress=progress)
-    values = study_values(study)
     if as_json:
-        print_json({"out": str(out), **values})
+        print_json({"out": str(out), **study_values(study)})
     else:
-        _print_study(values)
-        OUTPUT.print(f"Report: {out / 'report.html'}")
+        _print_study(study)
+        output().print(f"Report: {out / 'report.html'}")
 
 
 @app.command()
@@ -79,20 +95,21 @@ def simulate(
 
     Example: mrac simulate --duration 10 --stiffness 1200
     """
-    from mrac_design.export.trajectories import write_trajectories
-    from mrac_design.export.values import study_values
     from mrac_design.study import run_study
 
     chosen = options.chosen()
     with progress_bar("simulation") as progress:
         study = run_study(chosen, progress=lambda fraction: progress("simulating", fraction))
-    values = study_values(study)
     if out is not None:
+        from mrac_design.export.trajectories import write_trajectories
+
         write_trajectories(study, out)
     if as_json:
-        print_json(values)
+        from mrac_design.export.values import study_values
+
+        print_json(study_values(study))
     else:
-        _print_study(values)
+        _print_study(study)
 
 
 @app.command()
@@ -119,14 +136,16 @@ def design(options: DesignOptions, as_json: JsonOption = False) -> None:
             }
         )
         return
+    from rich.table import Table
+
     table = Table("gain", "value", title=chosen.title)
     for name, value, _ in result.coefficients:
         table.add_row(name, f"{value:.6g}")
-    OUTPUT.print(table)
-    OUTPUT.print("closed-loop poles: " + ", ".join(f"{a:.4g}{b:+.4g}j" for a, b in poles))
+    output().print(table)
+    output().print("closed-loop poles: " + ", ".join(f"{a:.4g}{b:+.4g}j" for a, b in poles))
     for name in margins.__slots__:
-        OUTPUT.print(f"{name.replace('_', ' ')}: {getattr(margins, name):.4g}")
-    OUTPUT.print(f"relative residual of the Diophantine equation: {result.residual:.2g}")
+        output().print(f"{name.replace('_', ' ')}: {getattr(margins, name):.4g}")
+    output().print(f"relative residual of the Diophantine equation: {result.residual:.2g}")
 
 
 @app.command("check-model")
@@ -164,12 +183,16 @@ def check_model(
     if as_json:
         print_json(facts)
         return
+    from rich.table import Table
+
     table = Table("fact", "value", title=f"{description.name}: a robot that can exist")
     for name, value in facts.items():
         table.add_row(name.replace("_", " "), _shown(value))
-    OUTPUT.print(table)
+    output().print(table)
 
 
+app.command()(paper)
+app.command()(tune)
 app.command()(export)
 app.command()(certify)
 app.command()(verify)
@@ -177,38 +200,47 @@ app.command()(stability)
 app.command()(realtime)
 app.command()(ensemble)
 app.command()(compare)
+app.command()(drift)
 
 
 def main() -> None:
     """Entry point: one clear sentence and status 2 for whatever the user can mend."""
     try:
-        app(standalone_mode=True)
+        app(prog_name="mrac")
     except MracDesignError as problem:
-        MESSAGES.print(f"[bold red]error:[/] {_escaped(str(problem))}", soft_wrap=True)
+        messages().print(f"[bold red]error:[/] {_escaped(str(problem))}", soft_wrap=True)
         sys.exit(2)
-    except KeyboardInterrupt:
-        MESSAGES.print("interrupted; nothing half-written was left behind")
-        sys.exit(130)
 
 
-def _print_study(values: dict[str, Any]) -> None:
-    title = f"{values['scenario']} on {values['robot']}, motion {values['motion']['name']}"
-    table = Table("controller", "axis", "max |y − Fd| %", "max |y − ym| mN", "rms y − ym mN",
-                  title=title)  # fmt: skip
-    for variant, axes in values["metrics"].items():
+def _print_study(study: StudyRecord) -> None:
+    from rich.table import Column, Table
+
+    from mrac_design.simulation.trajectory import event_texts
+
+    title = f"{study.scenario.name} on {study.robot.name}, motion {study.motion.name}"
+    table = Table(
+        Column("controller", no_wrap=True, min_width=16), "axis", "max |y − Fd| %",
+        "rms y − Fd mN", "max |y − ym| mN", "rms y − ym mN", title=title,
+    )  # fmt: skip
+    for variant, axes in study.tracking.items():
         for axis, metrics in axes.items():
             table.add_row(
                 variant,
                 axis,
-                f"{metrics['max_force_error_percent']:.3g}",
-                f"{1e3 * metrics['max_model_error_N']:.3g}",
-                f"{1e3 * metrics['rms_model_error_N']:.3g}",
+                f"{metrics.max_force_error_percent:.3g}",
+                f"{1e3 * metrics.rms_force_error_N:.3g}",
+                f"{1e3 * metrics.max_model_error_N:.3g}",
+                f"{1e3 * metrics.rms_model_error_N:.3g}",
             )
-    OUTPUT.print(table)
-    for variant, peaks in values["max_torque_Nm"].items():
+    output().print(table)
+    for variant, peaks in study.max_torque.items():
         shown = ", ".join(f"{motor} {peak:.3g}" for motor, peak in peaks.items())
-        OUTPUT.print(f"largest torques (N·m), {variant}: {shown}")
-    OUTPUT.print(f"ran on {values['engine']}")
+        output().print(f"largest torques (N·m), {variant}: {shown}")
+    for variant, trajectory in study.trajectories.items():
+        told = event_texts(trajectory.events, duration=study.scenario.simulation.duration)
+        if told:
+            output().print(f"events, {variant}: {'; '.join(told)}")
+    output().print(f"ran on {next(iter(study.trajectories.values())).engine}")
 
 
 def _shown(value: object) -> str:

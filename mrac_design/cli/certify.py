@@ -9,7 +9,7 @@ from typing import Annotated
 import typer
 
 from mrac_design.cli.console import print_json, progress_bar
-from mrac_design.cli.options import DesignOptions, StudyOptions, takes
+from mrac_design.cli.options import DesignOptions, JsonOption, StudyOptions, takes
 
 
 @takes(DesignOptions)
@@ -85,7 +85,7 @@ def stability(
     choices: Annotated[
         str, typer.Option(help="What to certify and how hard to try it: packaged or a TOML file.")
     ] = "paper",
-    as_json: Annotated[bool, typer.Option("--json", help="Print JSON for machines.")] = False,
+    as_json: JsonOption = False,
 ) -> None:
     """Write the stability report: what is proved, checked, assumed and violated.
 

@@ -7,9 +7,9 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
 import typer
-from rich.table import Table
 
-from mrac_design.cli.console import OUTPUT, print_json, progress_bar
+from mrac_design.cli.console import output, print_json, progress_bar
+from mrac_design.cli.options import JsonOption
 
 if TYPE_CHECKING:  # loading them takes longer than `--help` should
     from mrac_design.comparison import Comparison, ComparisonSpecification
@@ -34,7 +34,7 @@ def compare(
     only: Annotated[
         str | None, typer.Option(help="Names of controllers, separated by commas.")
     ] = None,
-    as_json: Annotated[bool, typer.Option("--json", help="Print JSON for machines.")] = False,
+    as_json: JsonOption = False,
 ) -> None:
     """Compare all controllers: same tuner, same budget, same noise, motions they never saw.
 
@@ -59,7 +59,7 @@ def compare(
         print_json(values)
     else:
         _print(comparison)
-        OUTPUT.print(f"Report: {out / 'report.html'}", soft_wrap=True)
+        output().print(f"Report: {out / 'report.html'}", soft_wrap=True)
 
 
 def _written(specification: ComparisonSpecification, out: Path) -> Comparison:
@@ -83,6 +83,8 @@ def _motion(
 
 
 def _print(comparison: Comparison) -> None:
+    from rich.table import Table
+
     from mrac_design.comparison.findings import claims, findings, measured_under, ranking
 
     first, second = comparison.conditions.judged[:2]
@@ -100,12 +102,12 @@ def _print(comparison: Comparison) -> None:
         table.add_row(contestant.title, *cells, *noise)
     limits = [f"{1e3 * comparison.limits[c.name].error:.2f}" for c in (first, second)]
     table.add_row("limit of linear control", *limits, "", "")
-    OUTPUT.print(table)
+    output().print(table)
     for sentence in findings(comparison):
-        OUTPUT.print(sentence.replace("**", ""), markup=False, highlight=False)
+        output().print(sentence.replace("**", ""), markup=False, highlight=False)
     for claim in claims(comparison):
         verdict = "met" if claim.met else "NOT MET"
-        OUTPUT.print(
+        output().print(
             f"{verdict}: {claim.text}: {claim.value} (wanted {claim.bound})",
             markup=False,
             highlight=False,

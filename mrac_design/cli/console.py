@@ -1,27 +1,57 @@
-"""Where the commands write: results to standard output, everything else to the error stream."""
+"""Where the commands write: results to standard output, everything else to the error stream.
+
+Rich loads with the first line it shapes: what prints JSON alone needs none of it.
+"""
 
 from __future__ import annotations
 
 import json
+import logging
 import sys
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
-from typing import Any
+from functools import cache
+from typing import TYPE_CHECKING, Any
 
-from rich.console import Console
-from rich.progress import BarColumn, Progress, TaskProgressColumn, TextColumn, TimeElapsedColumn
+if TYPE_CHECKING:
+    from rich.console import Console
 
-OUTPUT = Console()
-"""Standard output, for results."""
-MESSAGES = Console(stderr=True)
-"""The error stream, for errors, warnings and progress."""
+
+@cache
+def output() -> Console:
+    """Standard output, for results."""
+    from rich.console import Console
+
+    return Console()
+
+
+@cache
+def messages() -> Console:
+    """The error stream, for errors, warnings and progress."""
+    from rich.console import Console
+
+    return Console(stderr=True)
+
+
+class MessageHandler(logging.Handler):
+    """Log records on the error stream, above a running progress bar."""
+
+    def emit(self, record: logging.LogRecord) -> None:
+        from rich.logging import RichHandler
+
+        RichHandler(console=messages(), show_time=False, show_path=False).emit(record)
 
 
 @contextmanager
 def progress_bar(title: str) -> Iterator[Callable[[str, float], None]]:
     """A bar on the error stream; the callback takes what is being done and the finished share."""
+    if not sys.stderr.isatty():
+        yield lambda message, share: None
+        return
+    from rich.progress import BarColumn, Progress, TaskProgressColumn, TextColumn, TimeElapsedColumn
+
     columns = TextColumn("{task.description}"), BarColumn(), TaskProgressColumn()
-    with Progress(*columns, TimeElapsedColumn(), console=MESSAGES, transient=True) as bar:
+    with Progress(*columns, TimeElapsedColumn(), console=messages(), transient=True) as bar:
         task = bar.add_task(title, total=1.0)
         yield lambda message, share: bar.update(task, description=message, completed=share)
 

@@ -13,10 +13,9 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
-from rich.table import Table
 
-from mrac_design.cli.console import MESSAGES, OUTPUT, json_text, progress_bar
-from mrac_design.cli.options import StudyOptions, takes
+from mrac_design.cli.console import json_text, messages, output, progress_bar
+from mrac_design.cli.options import JsonOption, StudyOptions, takes
 from mrac_design.errors import EnsembleError, FileError, ParameterError
 
 if TYPE_CHECKING:  # loading them takes longer than `--help` should
@@ -69,7 +68,7 @@ def ensemble(
     out: Annotated[
         Path | None, typer.Option(help="Folder for summary.json, runs.npz, ensemble.png and .svg.")
     ] = None,
-    as_json: Annotated[bool, typer.Option("--json", help="Print JSON for machines.")] = False,
+    as_json: JsonOption = False,
 ) -> None:
     """Run a scenario thousands of times over tissue, true robot, gain and motion.
 
@@ -144,7 +143,7 @@ def _workers(count: int | None, cluster: str | None) -> Iterator[Workers]:
 
 
 def _say_interrupted(store: Path | None) -> None:
-    MESSAGES.print(
+    messages().print(
         "interrupted; nothing was kept: with --store DIR finished runs stay there"
         if store is None
         else f"interrupted; finished runs are kept in {store}: give the same command to go on",
@@ -171,6 +170,8 @@ def _write(record: EnsembleRecord, values: dict[str, Any], out: Path) -> None:
 
 
 def _print(record: EnsembleRecord, values: dict[str, Any]) -> None:
+    from rich.table import Table
+
     metrics = values["metrics"]
     table = Table(
         "error", "axis", "median mN", "95 % mN", "99 % mN", "largest mN",
@@ -179,7 +180,7 @@ def _print(record: EnsembleRecord, values: dict[str, Any]) -> None:
     for name, text in (("max_force_error_N", "max |y − Fd|"), ("rms_force_error_N", "rms y − Fd")):
         for axis, spread in metrics[name].items():
             table.add_row(text, axis, *(f"{1e3 * value:.3g}" for value in spread.values()))
-    OUTPUT.print(table)
+    output().print(table)
     drawn, ensemble = values["drawn"], record.prepared.ensemble
     gain = drawn["adaptation_gain"]
     low, high = drawn["stiffness_N_per_m"]
@@ -200,4 +201,4 @@ def _print(record: EnsembleRecord, values: dict[str, Any]) -> None:
 
 
 def _say(text: str) -> None:
-    OUTPUT.print(text, highlight=False, soft_wrap=True, markup=False)
+    output().print(text, highlight=False, soft_wrap=True, markup=False)

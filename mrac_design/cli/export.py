@@ -10,8 +10,8 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from mrac_design.cli.console import OUTPUT, print_json
-from mrac_design.cli.options import StudyOptions, takes
+from mrac_design.cli.console import output, print_json
+from mrac_design.cli.options import JsonOption, RealChoice, StudyOptions, takes
 from mrac_design.errors import ParameterError
 
 if TYPE_CHECKING:  # loading them takes longer than `--help` should
@@ -28,13 +28,6 @@ class ControllerChoice(Enum):
     FROZEN = "frozen"
     ADAPTIVE = "adaptive"
     ADAPTIVE_INVERSE = "adaptive_inverse"
-
-
-class RealChoice(Enum):
-    """Floating-point types of the exported C."""
-
-    DOUBLE = "double"
-    FLOAT = "float"
 
 
 @takes(StudyOptions)
@@ -64,7 +57,7 @@ def export(
     real: Annotated[
         RealChoice, typer.Option(help="Floating-point type of the C package.")
     ] = RealChoice.DOUBLE,
-    as_json: Annotated[bool, typer.Option("--json", help="Print JSON for machines.")] = False,
+    as_json: JsonOption = False,
 ) -> None:
     """Export the controller: gains, C package, FMU, formulas; linearising torque included.
 
@@ -124,14 +117,14 @@ def _tuned(
 
 
 def _write_c(step: RobotStep, tuned: GainSet, folder: Path, real: RealChoice) -> Summary:
-    from mrac_design.export.c_expressions import DOUBLE, FLOAT
+    from mrac_design.export.c_expressions import REAL_TYPES
     from mrac_design.export.c_package import export_c_package
     from mrac_design.export.gains import document_of
 
     package = export_c_package(
         step,
         folder,
-        number=DOUBLE if real is RealChoice.DOUBLE else FLOAT,
+        number=REAL_TYPES[real.value],
         gains_hash=document_of(tuned)["hash"],
         title=f"Adaptive force controller, {tuned.scenario}",
     )
@@ -167,9 +160,9 @@ def _print(done: Mapping[str, Summary], as_json: bool) -> None:
         print_json(done)
         return
     for what, summary in done.items():
-        OUTPUT.print(what, style="bold", highlight=False)
+        output().print(what, style="bold", highlight=False)
         for name, value in summary.items():
-            OUTPUT.print(
+            output().print(
                 f"  {name.replace('_', ' ')}: {value}",
                 highlight=False,
                 soft_wrap=True,

@@ -1,16 +1,28 @@
-"""Options that change a scenario, written once for every command that takes them."""
+"""Options of the commands; those that change a scenario are written once for all of them."""
 
 from __future__ import annotations
 
 import functools
 import inspect
-from collections.abc import Callable
+from collections.abc import Callable, Collection
 from dataclasses import dataclass, fields, replace
-from typing import Annotated, Any, get_type_hints
+from enum import Enum
+from typing import TYPE_CHECKING, Annotated, Any, get_type_hints
 
 import typer
 
-from mrac_design.simulation.scenario import Scenario, load_scenario
+if TYPE_CHECKING:  # loading it takes longer than `--help` should
+    from mrac_design.simulation.scenario import Scenario
+
+JsonOption = Annotated[bool, typer.Option("--json", help="Print JSON for machines.")]
+"""The option of every command that can answer in JSON."""
+
+
+class RealChoice(Enum):
+    """Floating-point types of the exported C."""
+
+    DOUBLE = "double"
+    FLOAT = "float"
 
 
 def _option(*names: str, text: str, panel: str) -> Any:
@@ -43,6 +55,8 @@ class DesignOptions:
 
     def chosen(self) -> Scenario:
         """The named scenario with these changes."""
+        from mrac_design.simulation.scenario import load_scenario
+
         base = load_scenario(self.scenario)
         design = _changed(
             base.design,
@@ -105,11 +119,14 @@ class StudyOptions(DesignOptions):
         )
 
 
-def takes(options: type[DesignOptions]) -> Callable[[Callable[..., None]], Callable[..., None]]:
-    """Give a command the fields of `options` as command-line options.
+def takes(
+    options: type[DesignOptions], *, without: Collection[str] = ()
+) -> Callable[[Callable[..., None]], Callable[..., None]]:
+    """Give a command the fields of `options` as command-line options, but for those `without`.
 
     The command receives them as one value, its first argument.
     """
+    offered = [field for field in fields(options) if field.name not in without]
 
     def decorate(command: Callable[..., None]) -> Callable[..., None]:
         hints = get_type_hints(options, include_extras=True)
@@ -121,7 +138,7 @@ def takes(options: type[DesignOptions]) -> Callable[[Callable[..., None]], Calla
                 default=field.default,
                 annotation=hints[field.name],
             )
-            for field in fields(options)
+            for field in offered
         ]
         own = [
             parameter.replace(
@@ -132,7 +149,7 @@ def takes(options: type[DesignOptions]) -> Callable[[Callable[..., None]], Calla
 
         @functools.wraps(command)
         def wrapper(**values: Any) -> None:
-            chosen = options(**{field.name: values.pop(field.name) for field in fields(options)})
+            chosen = options(**{field.name: values.pop(field.name) for field in offered})
             command(chosen, **values)
 
         wrapper.__signature__ = inspect.Signature(shared + own)  # type: ignore[attr-defined]

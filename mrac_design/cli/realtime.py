@@ -8,13 +8,14 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
 import typer
-from rich.table import Table
 
-from mrac_design.cli.console import MESSAGES, OUTPUT, json_text, print_json
-from mrac_design.cli.options import StudyOptions, takes
+from mrac_design.cli.console import json_text, messages, output, print_json
+from mrac_design.cli.options import JsonOption, RealChoice, StudyOptions, takes
 from mrac_design.errors import FileError, ParameterError
 
 if TYPE_CHECKING:  # loading them takes longer than `--help` should
+    from rich.table import Table
+
     from mrac_design.realtime import RealtimeReport, RealtimeRun
 
 _DURATION = 2.0
@@ -32,10 +33,13 @@ def realtime(
             help="Whole samples between a measurement and its torque; else the scenario's, or 1."
         ),
     ] = None,
+    real: Annotated[
+        RealChoice, typer.Option(help="Floating-point type of the controller.")
+    ] = RealChoice.DOUBLE,
     out: Annotated[
         Path | None, typer.Option(help="Folder for realtime.json and latency.png, .svg.")
     ] = None,
-    as_json: Annotated[bool, typer.Option("--json", help="Print JSON for machines.")] = False,
+    as_json: JsonOption = False,
 ) -> None:
     """Run the exported C step on the clock against the simulated robot; measure its latencies.
 
@@ -43,17 +47,19 @@ def realtime(
 
     Example: mrac realtime --rates 1000,2000,4000 --duration 2 --out reports/realtime
     """
+    from mrac_design.export.c_expressions import REAL_TYPES
     from mrac_design.realtime import run_realtime
 
     wanted = _parsed(rates)
     base = replace(options, duration=None).chosen()
     duration = _DURATION if options.duration is None else options.duration
     scenario = replace(base, simulation=replace(base.simulation, duration=duration, settling=0.0))
-    with MESSAGES.status("real time") as status:
+    with messages().status("real time") as status:
         report = run_realtime(
             scenario,
             rates=wanted,
             delay=delay,
+            number=REAL_TYPES[real.value],
             progress=lambda message, _: status.update(message),
         )
     if out is not None:
@@ -89,15 +95,17 @@ def _write(report: RealtimeReport, out: Path) -> None:
 
 
 def _print(report: RealtimeReport) -> None:
+    from rich.table import Table
+
     table = Table(
         "rate (Hz)", "time (µs)", "p50", "p99", "p99.9", "max", "missed",
         title=f"{report.controller} on {report.robot}, {report.duration:g} s, "
-        f"delay {report.delay}",
+        f"delay {report.delay}, {report.real}",
     )  # fmt: skip
     for run in report.runs:
         _add_rows(table, run)
         table.add_section()
-    OUTPUT.print(table)
+    output().print(table)
     for run in report.runs:
         _say(f"{run.rate:g} Hz: torques against the simulation's: {run.agreement}")
         _say(f"    {_conditions(run)}")
@@ -139,4 +147,4 @@ def _cost(run: RealtimeRun) -> str:
 
 
 def _say(text: str) -> None:
-    OUTPUT.print(text, highlight=False, soft_wrap=True, markup=False)
+    output().print(text, highlight=False, soft_wrap=True, markup=False)

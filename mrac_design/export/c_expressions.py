@@ -88,6 +88,9 @@ DOUBLE = RealType(name="double", suffix="", dtype=np.dtype(np.float64))
 FLOAT = RealType(name="float", suffix="f", dtype=np.dtype(np.float32))
 """32 bits: for processors whose floating-point unit knows nothing else."""
 
+REAL_TYPES = {number.name: number for number in (DOUBLE, FLOAT)}
+"""Both by name."""
+
 
 def c_statements(
     function: ca.Function,

@@ -33,7 +33,6 @@ from mrac_design.export.gain_set import GainSet
 from mrac_design.export.writing import written_whole
 from mrac_design.polynomials.rationals import polynomial_latex
 from mrac_design.robot import RobotDescription
-from mrac_design.robot.formulas import describe
 
 _LINEARISATION = r"""
 $$\begin{aligned}
@@ -93,7 +92,7 @@ def formulas_markdown(gains: GainSet, robot: RobotDescription) -> str:
             f"first joint times {gains.robot_model.first_joint_scale:.10g}. Other components of "
             f"the task: critically damped PD of {gains.tool_axis_bandwidth:.10g} rad/s.",
             "# Robot",
-            describe(robot),
+            robot._repr_markdown_(),
         )
     )
 

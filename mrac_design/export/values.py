@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from dataclasses import asdict
-from importlib.metadata import version
 from typing import Any
 
 from mrac_design.study import StudyRecord
@@ -11,6 +10,8 @@ from mrac_design.study import StudyRecord
 
 def study_values(study: StudyRecord) -> dict[str, Any]:
     """Figures of merit with what they rest on; every number was computed in this run."""
+    from importlib.metadata import version  # loads all that reads mail headers
+
     motion = study.motion
     return {
         "mrac_design": version("mrac-design"),
@@ -31,5 +32,12 @@ def study_values(study: StudyRecord) -> dict[str, Any]:
         },
         "max_torque_Nm": {variant: dict(peaks) for variant, peaks in study.max_torque.items()},
         "torque_limit_Nm": {joint.name: joint.motor_torque_limit for joint in study.robot.joints},
+        "events": {
+            variant: [
+                {"time_s": event.time, "name": event.event.name, "change": event.change}
+                for event in trajectory.events
+            ]
+            for variant, trajectory in study.trajectories.items()
+        },
         "worst_jacobian_condition": study.worst_condition,
     }

@@ -6,12 +6,12 @@ Run as `python -m mrac_design.motion.fitting RECORDING.csv --out FILE`.
 from __future__ import annotations
 
 import logging
-import sys
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Annotated
 
-import click
 import numpy as np
+import typer
 from scipy.signal import butter, filtfilt
 
 from mrac_design.arrays import FloatArray
@@ -244,33 +244,18 @@ def fit_file(
     )
 
 
-@click.command(context_settings={"show_default": True})
-@click.argument("recording", type=click.Path(path_type=Path))
-@click.option(
-    "--out", type=click.Path(path_type=Path), required=True, help="Model file to write, TOML."
-)
-@click.option("--source", default="a recording", help="Where the recording comes from.")
-@click.option("--name", default="heart_invivo_fit", help="Name of the model.")
-@click.option("--point", default="p4", help="Tracked point.")
-@click.option("--frame-rate", default=25.0, help="Frames a second (assumed).")
-@click.option("--cutoff", default=8.0, help="Cut-off of the low-pass, Hz.")
-@click.option("--training", default=600, help="Leading frames to fit.")
-@click.option("--seed", default=SEED, help="Seed written into the model.")
 def main(
-    recording: Path,
-    out: Path,
-    source: str,
-    name: str,
-    point: str,
-    frame_rate: float,
-    cutoff: float,
-    training: int,
-    seed: int,
+    recording: Annotated[Path, typer.Argument(help="Track file, .csv or .mat.")],
+    out: Annotated[Path, typer.Option(help="Model file to write, TOML.")],
+    source: Annotated[str, typer.Option(help="Where the recording comes from.")] = "a recording",
+    name: Annotated[str, typer.Option(help="Name of the model.")] = "heart_invivo_fit",
+    point: Annotated[str, typer.Option(help="Tracked point.")] = "p4",
+    frame_rate: Annotated[float, typer.Option(help="Frames a second (assumed).")] = 25.0,
+    cutoff: Annotated[float, typer.Option(help="Cut-off of the low-pass, Hz.")] = 8.0,
+    training: Annotated[int, typer.Option(help="Leading frames to fit.")] = 600,
+    seed: Annotated[int, typer.Option(help="Seed written into the model.")] = SEED,
 ) -> None:
-    """Fit the dual Fourier heart-motion model to a recorded track and write it as TOML.
-
-    RECORDING is a track file, .csv or .mat.
-    """
+    """Fit the dual Fourier heart-motion model to a recorded track and write it as TOML."""
     logging.basicConfig(level=logging.INFO, format="%(message)s")
     try:
         fit = fit_file(
@@ -286,7 +271,7 @@ def main(
         write_fit(fit, out)
     except MracDesignError as error:
         logger.error("%s", error)
-        sys.exit(2)
+        raise typer.Exit(code=2) from error
     for residual in fit.residuals:
         logger.info(
             "beats %s: held-back residual %s mm, explained %s",
@@ -298,4 +283,4 @@ def main(
 
 
 if __name__ == "__main__":
-    main()
+    typer.run(main)

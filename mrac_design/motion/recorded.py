@@ -1,4 +1,8 @@
-"""Heart motion from a recorded track of camera frames, CSV or MATLAB."""
+"""Heart motion from a recorded track of camera frames, CSV or MATLAB.
+
+SciPy is imported where it is used: loading its filters takes longer than a study of a recording
+to run. What they made of a recording is kept for later processes.
+"""
 
 from __future__ import annotations
 
@@ -7,11 +11,11 @@ from pathlib import Path
 import numpy as np
 
 from mrac_design.arrays import FloatArray
+from mrac_design.derivation_cache import derived_text, scipy_release
 from mrac_design.errors import MotionFileError, ParameterError
-from mrac_design.motion.frames import cubic_spline, zero_phase_butterworth
 from mrac_design.motion.heart import HeartMotion, Origin, centred_motion
 from mrac_design.motion.model_file import available_motions
-from mrac_design.motion.signal import PiecewisePolynomial
+from mrac_design.motion.signal import PiecewisePolynomial, from_ppoly
 from mrac_design.motion.track_file import read_track
 
 FILTER_ORDER = 4
@@ -47,7 +51,7 @@ def read_recorded_motion(
             file, "frame rate", f"{frame_rate} Hz: must be a positive number of frames a second"
         )
     track = read_track(file, point=point, unit=unit)
-    filtered = low_pass(track.position, frame_rate=frame_rate, cutoff=cutoff, path=file)
+    spline = _kept_spline(file, track.position, frame_rate, cutoff, start_frame)
     return centred_motion(
         name=f"{file.stem} {point}",
         origin=Origin.RECORDED,
@@ -59,32 +63,57 @@ def read_recorded_motion(
             f"backwards, cut-off {cutoff:g} Hz.",
             f"Between frames a cubic spline: nothing above {frame_rate / 2:g} Hz was recorded.",
         ),
-        displacement=_spline(file, filtered, frame_rate, start_frame, duration),
+        displacement=_beginning(file, spline, frame_rate, duration),
     )
 
 
-def _spline(
-    path: Path, position: FloatArray, frame_rate: float, start: int, duration: float | None
+def _kept_spline(
+    path: Path, position: FloatArray, frame_rate: float, cutoff: float, start: int
 ) -> PiecewisePolynomial:
-    """Cubic spline through the frames from `start` on, as long as asked for."""
+    """Cubic spline through the low-passed frames from `start` on."""
+
+    def derive() -> str:
+        filtered = low_pass(position, frame_rate=frame_rate, cutoff=cutoff, path=path)
+        spline = _spline(path, filtered, frame_rate, start)
+        return f"{spline.breakpoints.tobytes().hex()} {spline.coefficients.tobytes().hex()}"
+
+    content = repr((frame_rate, cutoff, start)).encode() + position.tobytes()
+    words = derived_text(("motion",), scipy_release(), content, derive).split()
+    breakpoints, coefficients = (np.frombuffer(bytes.fromhex(word)) for word in words)
+    return PiecewisePolynomial(
+        breakpoints=breakpoints,
+        coefficients=coefficients.reshape(position.shape[1], breakpoints.size - 1, -1),
+    )
+
+
+def _spline(path: Path, position: FloatArray, frame_rate: float, start: int) -> PiecewisePolynomial:
+    """Cubic spline through the frames from `start` on."""
+    from scipy.interpolate import CubicSpline
+
     frames = position.shape[0]
     if not 0 <= start < frames - 1:
         raise MotionFileError(
             path, "start frame", f"{start}: must be one of 0 … {frames - 2} of {frames} frames"
         )
     used = position[start:]
-    available = (used.shape[0] - 1) / frame_rate
+    return from_ppoly(CubicSpline(np.arange(used.shape[0]) / frame_rate, used))
+
+
+def _beginning(
+    path: Path, spline: PiecewisePolynomial, frame_rate: float, duration: float | None
+) -> PiecewisePolynomial:
+    """As much of the motion as is asked for."""
+    available = spline.end
     length = available if duration is None else duration
     if not (np.isfinite(length) and length > 0.0):
         raise ParameterError("duration", length, "must be a positive time in s")
     if length > available * (1.0 + 1e-12):
         raise MotionFileError(
             path,
-            f"{used.shape[0]} frames",
+            f"{spline.segments + 1} frames",
             f"last {available:.6g} s at {frame_rate:g} Hz, but {length:.6g} s are asked for: "
             "shorten the duration or take a longer recording",
         )
-    spline = cubic_spline(used, frame_rate=frame_rate)
     return spline if length >= available else spline.restricted(0.0, length)
 
 
@@ -108,6 +137,8 @@ def low_pass(position: FloatArray, *, frame_rate: float, cutoff: float, path: Pa
             f"{position.shape[0]} frames",
             f"too short: the low-pass filter needs more than {padding}",
         )
-    return zero_phase_butterworth(
-        position, order=FILTER_ORDER, share=cutoff / nyquist, padding=padding
-    )
+    from scipy.signal import butter, filtfilt
+
+    b, a = butter(FILTER_ORDER, cutoff / nyquist)
+    filtered: FloatArray = filtfilt(b, a, position, axis=0, padlen=padding)
+    return filtered

@@ -15,7 +15,7 @@ from typing import TYPE_CHECKING, Any
 
 import casadi as ca
 
-from mrac_design.derivation_cache import derived_text
+from mrac_design.derivation_cache import casadi_release, derived_text
 from mrac_design.robot.description import RobotDescription
 
 if TYPE_CHECKING:
@@ -38,7 +38,8 @@ def _function_of(needed: str) -> Callable[[_Derivation], cached_property[Any]]:
                 return str(own.function(name, needed, derivation(self, own)).serialize())
 
             content = pickle.dumps((name, self.description))
-            return ca.Function.deserialize(derived_text(("robot",), content, derive))
+            text = derived_text(("robot",), casadi_release(), content, derive)
+            return ca.Function.deserialize(text)
 
         return cached_property(function)
 

@@ -6,7 +6,7 @@ import pickle
 
 import casadi as ca
 
-from mrac_design.derivation_cache import derived_text
+from mrac_design.derivation_cache import casadi_release, derived_text
 from mrac_design.simulation.method import Method
 from mrac_design.simulation.system import HybridSystem
 
@@ -30,4 +30,4 @@ def kept_c_program(
         )
 
     content = pickle.dumps((system, method, input_powers, lanes, reduction))
-    return derived_text(("codegen", "simulation"), content, derive)
+    return derived_text(("codegen", "simulation"), casadi_release(), content, derive)

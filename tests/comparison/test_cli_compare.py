@@ -3,7 +3,7 @@ from __future__ import annotations
 import json
 
 import pytest
-from click.testing import CliRunner
+from typer.testing import CliRunner
 
 from mrac_design.cli.compare import compare
 from mrac_design.errors import ParameterError
@@ -12,7 +12,11 @@ from mrac_design.report import comparison_report
 
 @pytest.fixture
 def runner():
-    return lambda *arguments: CliRunner().invoke(compare, list(arguments))
+    import typer
+
+    app = typer.Typer()
+    app.command()(compare)
+    return lambda *arguments: CliRunner().invoke(app, list(arguments))
 
 
 def test_finished_runs_are_written_up(runner, comparison, folder, monkeypatch):

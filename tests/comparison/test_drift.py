@@ -6,9 +6,10 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from click.testing import CliRunner
-from mrac_design.cli.drift import drift
+import typer
+from typer.testing import CliRunner
 
+from mrac_design.cli.drift import drift
 from mrac_design.comparison.drift import DriftBench, drift_runs
 from mrac_design.comparison.drift_cases import (
     GUARDED,
@@ -146,7 +147,9 @@ def test_pictures_show_every_law_and_a_lost_loop_ends(bench, cycles):
 
 
 def test_a_continuous_scenario_is_refused_before_anything_is_written(tmp_path):
-    failed = CliRunner().invoke(drift, ["-s", "nominal", "--out", str(tmp_path / "x")])
+    app = typer.Typer()
+    app.command()(drift)
+    failed = CliRunner().invoke(app, ["-s", "nominal", "--out", str(tmp_path / "x")])
     assert isinstance(failed.exception, ParameterError)
     assert not (tmp_path / "x").exists()
 

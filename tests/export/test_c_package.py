@@ -13,7 +13,7 @@ from hypothesis import strategies as st
 from mrac_design.controller.robot_step import RobotStep
 from mrac_design.errors import FileError
 from mrac_design.export import c_counts, c_package
-from mrac_design.export.c_expressions import DOUBLE, FLOAT, RealType, operation_count
+from mrac_design.export.c_expressions import DOUBLE, FLOAT, REAL_TYPES, RealType, operation_count
 from mrac_design.export.c_package import CPackage, export_c_package
 from mrac_design.export.c_selftest import build_self_test as self_test_of
 from mrac_design.export.c_selftest import evaluate_in
@@ -35,7 +35,6 @@ from tests.export.c_harness import Controller, build_self_test, command, tool
 from tests.robot_steps import STIFFNESS, dynamics_of, robot_step
 
 ROBOT = "d2m2_set_a"
-NUMBERS = {"double": DOUBLE, "float": FLOAT}
 
 
 def export(step: RobotStep, folder: Path, number: RealType = DOUBLE) -> CPackage:
@@ -46,7 +45,8 @@ def export(step: RobotStep, folder: Path, number: RealType = DOUBLE) -> CPackage
 def packages(tmp_path_factory) -> dict[str, CPackage]:
     folder = tmp_path_factory.mktemp("packages")
     return {
-        name: export(robot_step(ROBOT), folder / name, number) for name, number in NUMBERS.items()
+        name: export(robot_step(ROBOT), folder / name, number)
+        for name, number in REAL_TYPES.items()
     }
 
 
@@ -117,7 +117,7 @@ def simulated() -> SimulatedRun:
 
 
 @pytest.mark.parametrize("compiler", ["gcc", "clang"])
-@pytest.mark.parametrize("name", NUMBERS)
+@pytest.mark.parametrize("name", REAL_TYPES)
 def test_compiles_without_a_warning_and_passes_its_self_test(packages, tmp_path, name, compiler):
     program = build_self_test(packages[name].directory, tmp_path / "selftest", compiler, "-O1")
     result = command(program, "1")
@@ -126,7 +126,7 @@ def test_compiles_without_a_warning_and_passes_its_self_test(packages, tmp_path,
     assert "microseconds a step" in result.stdout
 
 
-@pytest.mark.parametrize("name", NUMBERS)
+@pytest.mark.parametrize("name", REAL_TYPES)
 def test_is_clean_under_the_sanitizer(packages, tmp_path, name):
     checked = build_self_test(
         packages[name].directory, tmp_path / "checked", "gcc",
@@ -241,7 +241,7 @@ def test_nan_becomes_nan_and_not_full_torque(double):
     assert not np.any(np.abs(torque) == robot_step(ROBOT).robot.effort_limits)
 
 
-@pytest.mark.parametrize("name", NUMBERS)
+@pytest.mark.parametrize("name", REAL_TYPES)
 def test_instruction_count_does_not_depend_on_the_data(packages, tmp_path, name):
     valgrind, compiler = tool("valgrind"), tool("cc")
     folder, count = packages[name].directory, packages[name].costs.instructions
@@ -249,7 +249,7 @@ def test_instruction_count_does_not_depend_on_the_data(packages, tmp_path, name)
     calm = (folder / "mrac_selftest_vectors.h").read_text()
     random = np.random.default_rng(1).uniform(-1.0, 1.0, (64, 16))
     wild = random * np.repeat([3.0, 5.0, 50.0, 50.0], [5, 5, 3, 3])
-    rows = "\n".join(f"{{{', '.join(map(NUMBERS[name].literal, row))}}}," for row in wild)
+    rows = "\n".join(f"{{{', '.join(map(REAL_TYPES[name].literal, row))}}}," for row in wild)
     other = re.sub(r"(test_inputs[^{]*\{).*?\n\};", rf"\g<1>\n{rows}\n}};", calm, flags=re.DOTALL)
     assert other != calm
     flags = ("-O2", "-std=c99", "-ffp-contract=off")
@@ -295,7 +295,7 @@ def test_cmake_builds_and_tests_it(packages, tmp_path):
 def test_readme_tells_what_the_structs_take(packages):
     for name, package in packages.items():
         header = (package.directory / "mrac_controller.h").read_text()
-        size = NUMBERS[name].dtype.itemsize
+        size = REAL_TYPES[name].dtype.itemsize
         for struct, told in (
             ("state", package.state_bytes),
             ("parameters", package.parameter_bytes),

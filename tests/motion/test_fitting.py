@@ -6,7 +6,8 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from click.testing import CliRunner
+import typer
+from typer.testing import CliRunner
 
 from mrac_design.errors import MotionFileError, ParameterError
 from mrac_design.motion import VariableRhythm, find_model, read_model
@@ -84,7 +85,9 @@ def test_motion_without_beats_or_too_short_is_refused() -> None:
 
 def test_the_command_says_what_is_wrong_and_writes_nothing(tmp_path: Path) -> None:
     track = write_csv(tmp_path / "short.csv", slow_track(100, RATE))
-    result = CliRunner().invoke(main, [str(track), "--out", str(tmp_path / "m.toml")])
+    app = typer.Typer()
+    app.command()(main)
+    result = CliRunner().invoke(app, [str(track), "--out", str(tmp_path / "m.toml")])
     assert result.exit_code == 2
     assert not (tmp_path / "m.toml").exists()
 

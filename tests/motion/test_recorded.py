@@ -11,7 +11,7 @@ from scipy.io import savemat
 from scipy.signal import butter, freqz
 
 from mrac_design.errors import MotionFileError, ParameterError
-from mrac_design.motion import Origin, read_recorded_motion
+from mrac_design.motion import Origin, read_recorded_motion, recorded
 
 from .tracks import slow_track, write_csv
 
@@ -49,6 +49,23 @@ def test_the_low_pass_has_the_stated_response_and_no_phase(tmp_path: Path) -> No
         # Forwards and backwards: the squared magnitude, in phase with the input.
         expected = np.abs(response[axis]) ** 2 * position[used, axis]
         np.testing.assert_allclose(found[axis], expected, atol=2e-3)  # what is left of the ends
+
+
+def test_a_kept_recording_has_the_bits_of_the_first_reading(track: Path, tmp_path, monkeypatch):
+    monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path / "cache"))
+
+    def coefficients(**changed: float) -> bytes:
+        choices = {"frame_rate": RATE, "cutoff": 8.0, "start_frame": 0, **changed}
+        return read_recorded_motion(track, **choices).displacement.coefficients.tobytes()
+
+    first = coefficients()
+    others = [{"cutoff": 7.0}, {"frame_rate": 26.0}, {"start_frame": 1}]
+    assert len({first, *(coefficients(**changed) for changed in others)}) == 4
+    with monkeypatch.context() as without:
+        without.setattr(recorded, "low_pass", None)  # what is kept needs no filter
+        assert coefficients() == first
+    write_csv(track, 2.0 * slow_track(250, RATE))
+    assert coefficients() != first
 
 
 def test_frame_rate_stretches_time_and_a_start_frame_moves_it(track: Path) -> None:

@@ -6,13 +6,17 @@ import json
 import xml.etree.ElementTree as ElementTree
 
 import pytest
-from click.testing import CliRunner
+import typer
+from typer.testing import CliRunner
 
 from mrac_design.cli.realtime import realtime
 from mrac_design.errors import FileError, ParameterError
 from mrac_design.export.c_expressions import DOUBLE, FLOAT
 from mrac_design.simulation.scenario import save_scenario
 from tests.realtime.small_scenario import small_scenario
+
+APP = typer.Typer()
+APP.command()(realtime)
 
 
 @pytest.fixture
@@ -30,7 +34,7 @@ def finished(report, monkeypatch):
 
 
 def run(*words: str) -> str:
-    result = CliRunner().invoke(realtime, words, catch_exceptions=False)
+    result = CliRunner().invoke(APP, words, catch_exceptions=False)
     assert result.exit_code == 0, result.output
     return result.stdout
 

@@ -4,7 +4,8 @@ import json
 import signal
 
 import pytest
-from click.testing import CliRunner
+import typer
+from typer.testing import CliRunner
 
 from mrac_design.cli import tune as cli_tune
 from mrac_design.errors import FileError, ParameterError, TuningError
@@ -15,6 +16,9 @@ from tests.tuning.conftest import small
 
 pytestmark = pytest.mark.skipif(find_compiler() is None, reason="no C compiler here")
 
+APP = typer.Typer()
+APP.command()(cli_tune.tune)
+
 
 @pytest.fixture
 def scenario(tmp_path):
@@ -24,7 +28,7 @@ def scenario(tmp_path):
 
 
 def run(*words: str, status: int = 0):
-    result = CliRunner().invoke(cli_tune.tune, words)
+    result = CliRunner().invoke(APP, words)
     assert result.exit_code == status, result.output
     return result
 
