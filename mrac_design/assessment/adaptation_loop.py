@@ -82,7 +82,7 @@ def regressor_square(design: RSTDesign, force: float, bias_force: float) -> floa
     1/Am (ω F0/ao without internal model), the bias its own."""
     specification = design.specification
     static = specification.observer[-1] * specification.reference_model.bandwidth**2
-    ratio = specification.plant.b0 * design.scaling[-1] / static
+    ratio = specification.plant.b0 * float(design.scaling[-1]) / static
     return 2 * (ratio * force) ** 2 + bias_force**2
 
 

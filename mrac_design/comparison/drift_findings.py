@@ -11,6 +11,7 @@ import numpy as np
 from mrac_design.arrays import FloatArray
 from mrac_design.comparison.drift import DriftBench, DriftRun
 from mrac_design.controller.axis_loop import axis_loop
+from mrac_design.polynomials.rationals import decimal_rational
 from mrac_design.simulation.safeguards import safeguard_entries
 from mrac_design.stability.adaptive_loop import exact
 from mrac_design.stability.parameter_box import ParameterBox
@@ -69,13 +70,12 @@ def frozen_growth(
     """
     design, choice = bench.design, bench.scenario.design
     timing = bench.measurement
-    loop = axis_loop(design, [timing.domain.period])
+    sampled = sampling(decimal_rational(timing.domain.period), timing.delay + extra_delay)
+    loop = axis_loop(design, [sampled.period])
     feedback = tuple(exact(float(gain), "gain") for gain in gains[: len(loop.gains)])
     ratio = exact(bench.scenario.stiffness / choice.stiffness, "stiffness ratio")
     point = ParameterBox(lower=feedback, upper=feedback, stiffness_ratio=(ratio, ratio))
-    vertices = sampled_vertices(
-        loop, point, sampling(timing.domain.period, timing.delay + extra_delay)
-    )
+    vertices = sampled_vertices(loop, point, sampled)
     matrix = np.array([[to_float(entry) for entry in row] for row in vertices[0].A])
     return float(np.abs(np.linalg.eigvals(matrix)).max())
 

@@ -106,9 +106,7 @@ def rst_contestants() -> tuple[Contestant, ...]:
             (*adaptive, BIAS, BOX),
             _mrac_certified,
             _BOXED,
-            lambda setting, values: box_is_certified(
-                setting, rst_design(setting, values), float(values[6])
-            ),
+            _box_is_certified,
         ),
         _contestant(
             "mrac_resonant",
@@ -163,6 +161,10 @@ def box_is_certified(setting: AxisSetting, design: RSTDesign, share: float) -> b
     loop = axis_loop(design, [timing.period])
     tissue = (setting.stiffness, STIFFEST_FACTOR * setting.stiffness)
     return has_common_lyapunov_function(loop, relative_box(loop, share, tissue), timing)
+
+
+def _box_is_certified(setting: AxisSetting, values: FloatArray) -> bool:
+    return box_is_certified(setting, rst_design(setting, values), float(values[6]))
 
 
 def _resonant_box_is_certified(setting: AxisSetting, values: FloatArray) -> bool:

@@ -178,10 +178,14 @@ def within_limits(wanted: ca.SX, commanded: ca.SX, limit: ca.SX) -> ca.SX:
     # Which share of the command is too much, at most 1, and none where it pushes inwards.
     excess = _positive_part(ca.fabs(wanted) - limit)
     share = excess / (ca.fmax(ca.fabs(commanded), excess) + _NOTHING)
-    along = wanted * commanded
-    outwards = _positive_part(along) / (ca.fabs(along) + _NOTHING)  # 1 or 0
-    cut = ca.mmax(share * outwards)
+    cut = ca.mmax(share * outwards(wanted, commanded))
     return saturated(wanted - cut * commanded, limit)
+
+
+def outwards(wanted: ca.SX, commanded: ca.SX) -> ca.SX:
+    """1 where the commanded part makes the whole effort larger, else 0, entry by entry."""
+    along = wanted * commanded
+    return _positive_part(along) / (ca.fabs(along) + _NOTHING)
 
 
 def _positive_part(x: ca.SX) -> ca.SX:

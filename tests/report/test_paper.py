@@ -121,7 +121,7 @@ def test_provenance_names_what_a_sampled_robot_meets(studies):
     assert table["contact"][0].startswith("one-sided")
     assert table["damping of the tissue"][0] == "2 N·s/m"
     assert table["factor on $K_s$"][0] == "1 from 0 s, 1.5 from 1 s, 1 from 3 s"
-    assert table["safeguards of the law"][0].startswith("leakage (rate 1), projection")
+    assert table["safeguards of the law"][0].startswith("leakage (rate 0.2), projection")
     measured = ("sampling", "force sensor", "joint sensors", "friction of the joints", "contact")
     assert {table[name][1] for name in measured} == {"assumed"}
 

@@ -23,7 +23,7 @@ from mrac_design.simulation.scenario import (
 )
 from mrac_design.simulation.scenario_run import ready_loop, simulate
 from mrac_design.simulation.trajectory import Trajectory
-from mrac_design.stability.certification import certify
+from mrac_design.stability.certification import has_common_lyapunov_function
 from mrac_design.stability.parameter_box import relative_box
 from mrac_design.stability.sampled_loop import sampling
 from mrac_design.study import (
@@ -37,7 +37,6 @@ from mrac_design.study import (
     scenario_motion,
     variant_step,
 )
-from mrac_design.verdict import Verdict
 
 BEST = "adaptive_inverse"
 
@@ -206,8 +205,7 @@ def test_the_certificate_covers_the_box_and_the_tissue():
     loop = axis_loop(design, [timing.period])
     # The vertical axis answers 1.25 times too strongly, which is tissue that much stiffer.
     box = relative_box(loop, "0.05", (800, 1500))
-    certificate = certify(loop, box, timing)
-    assert certificate.verdict is Verdict.PROVED
+    assert has_common_lyapunov_function(loop, box, timing)
     nominal = design.scaled_parameters
     gains = study("reality").trajectories[BEST]["adapted_gains"].reshape(-1, 3, len(nominal) + 1)
     inside = np.abs(gains[:, :, :-1] - nominal) <= 0.05 * np.abs(nominal) * (1 + 1e-12)
