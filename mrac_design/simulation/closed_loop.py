@@ -16,7 +16,7 @@ from numpy.typing import ArrayLike
 
 from mrac_design.arrays import FloatArray, readonly
 from mrac_design.controller.linearisation import Linearisation
-from mrac_design.controller.robot_step import outwards, saturated, within_limits
+from mrac_design.controller.robot_step import saturated
 from mrac_design.controller.step import ControllerStep, require_domain
 from mrac_design.layout import Layout
 from mrac_design.robot import RobotDynamics, check_posture, inertial_parameters
@@ -200,13 +200,7 @@ class _Equations:
         wanted = self.linearisation.torque(q, qd, force, command, symbols["linearisation"])
         limit = symbols["effort_limit"]
         within = None if modes is None else modes.within
-        still = self.linearisation.torque(
-            q, qd, force, ca.DM.zeros(len(axes)), symbols["linearisation"]
-        )
-        if within is None:
-            effort = within_limits(wanted, wanted - still, limit)
-        else:
-            effort = _within_limits_in_modes(wanted, wanted - still, limit, within)
+        effort = saturated(wanted, limit) if within is None else limited(wanted, limit, within)
         qdd = self.plant.acceleration(states, effort, force, symbols)
         recorded = {
             "force": force,
@@ -235,19 +229,6 @@ def limited(wanted: ca.SX, limit: ca.SX, within: ca.SX) -> ca.SX:
 
 
 _HUGE = 1e30
-
-
-def _within_limits_in_modes(wanted: ca.SX, commanded: ca.SX, limit: ca.SX, within: ca.SX) -> ca.SX:
-    """`within_limits` where joints are taken to be within (1) or beyond (0) their limits.
-
-    Smooth where one comes or goes, its excess being negative for an instant; which of several
-    joints has the largest share is no event.
-    """
-    size = ca.fabs(commanded) + 1 / _HUGE
-    excess = ca.fmin(ca.fabs(wanted) - limit, size)
-    share = outwards(wanted, commanded) * excess / size - within * _HUGE
-    cut = (1 - ca.mmin(within)) * ca.mmax(share)
-    return saturated(wanted - cut * commanded, ca.fmax(limit, within * ca.fabs(wanted)))
 
 
 @dataclass(frozen=True, slots=True, eq=False)

@@ -10,7 +10,12 @@ from mrac_design.controller.adaptation import NormalisedGradientLaw
 from mrac_design.controller.adaptive import AdaptiveRST, build_step, nominal_gains
 from mrac_design.controller.linearisation import RobotModelError, build_linearisation
 from mrac_design.controller.reference import ModelInverse
-from mrac_design.design import ReferenceModel, RSTSpecification, design_rst, first_order_observer
+from mrac_design.design import (
+    ReferenceModel,
+    RSTSpecification,
+    design_rst,
+    first_order_observer,
+)
 from mrac_design.errors import ParameterError, SimulationError, SingularPostureError
 from mrac_design.motion.signal import PiecewisePolynomial, quintic_hermite, stack
 from mrac_design.plant import ForcePlant
@@ -173,40 +178,6 @@ def test_frozen_force_error_is_the_disturbance_sensitivity(dynamics, true_stiffn
     expected = abs(sensitivity) * true_stiffness * amplitude
     # Samples every 5 ms see the peak of an 8 rad/s sine to (ω h)²/8 = 2e-4.
     np.testing.assert_allclose(np.abs(error).max(axis=0), expected, rtol=2e-3)
-
-
-def test_a_joint_at_its_limit_shrinks_the_command_as_a_whole(dynamics):
-    """The part of the efforts that the command adds keeps its direction."""
-    loop = loop_of(dynamics)
-    axes = len(dynamics.description.force_axes)
-    q, force = dynamics.description.home, np.full(axes, 1.0)
-    x = resting_state(loop, posture=q, force=force, condition_limit=100.0)
-    tip = np.array(dynamics.task_position(q))[:axes, 0]
-    pressed = np.linspace(0.02, 0.05, axes)
-    inputs = np.concatenate([tip - pressed, force])
-    layout = loop.system.parameters
-    values = layout.split(np.array(loop.parameter_values))
-
-    def effort(limits):
-        given = layout.pack({**values, "effort_limit": limits})
-        outputs = loop.system.output(x, [], inputs, given).full().ravel()
-        return loop.system.outputs.split(outputs)["effort"]
-
-    torque = build_linearisation(
-        dynamics, velocity_gain=50.0, tool_axis_bandwidth=50.0,
-        model_error=RobotModelError(body_scale=1.0, first_joint_scale=1.0),
-    ).torque  # fmt: skip
-    still = torque(q, 0 * q, STIFFNESS * pressed, np.zeros(axes), values["linearisation"])
-    still = still.full().ravel()
-    free = effort(np.full(q.size, 1e9))
-    limits = np.full(q.size, 1e9)
-    worst = int(np.argmax(np.abs(free)))
-    limits[worst] = np.abs(still[worst]) + 0.3 * np.abs(free - still)[worst]
-    assert abs(free[worst]) > limits[worst]
-    share = (effort(limits)[worst] - still[worst]) / (free - still)[worst]
-    assert 0.0 < share < 0.9
-    # Differences of efforts of up to 1e6 N·m, each to 1e-16 of it.
-    np.testing.assert_allclose(effort(limits) - still, share * (free - still), rtol=1e-9)
 
 
 def test_an_unstable_loop_is_reported_with_its_instant(dynamics):
