@@ -16,9 +16,9 @@ from pathlib import Path
 
 import casadi as ca
 import numpy as np
-from mrac_design.derivation_cache import cache_directory
 
 from benchmarks.harness import Evaluate, pointers
+from mrac_design.derivation_cache import cache_directory
 from mrac_design.robot import JointType, RobotDescription
 
 _SOURCE = """\
