@@ -81,7 +81,8 @@ Friction and errors of the robot's model are left out here: they are alike for a
 # Minimised is the rms force error $y - F_d$ on the training motion, under steps of the reference.
 # A tuning is admissible when one more sample of dead time, which no law knows of, does not more
 # than double that error: simulated, so the rule is the same for linear and for adaptive laws. A
-# global search (differential evolution) spends half of the evaluations, a simplex search the rest.
+# global search (differential evolution) spends half of the evaluations, a simplex search the rest;
+# what adapts is tuned last, after the controller it adapts.
 # Laws that take heart or breathing rate as known are told it, motion by motion; the one that needs
 # an ECG gets the instants of the beats. PI with learning is made for a fast inner velocity loop and
 # may choose its $K_2$. The motion predictor's repetition over a whole breath would need thousands

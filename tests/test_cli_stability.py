@@ -9,8 +9,10 @@ import typer
 from typer.testing import CliRunner
 
 from mrac_design.cli.certify import stability
+from mrac_design.errors import ParameterError
 from mrac_design.report import stability_report
-from mrac_design.report.stability_report import StabilityReport
+from mrac_design.report.stability_report import StabilityReport, write_stability_report
+from mrac_design.simulation.scenario import load_scenario
 
 
 @pytest.fixture
@@ -57,3 +59,9 @@ def test_options_reach_the_report_and_numbers_the_user(seen, tmp_path):
 def test_json_for_machines(seen):
     result = run("--json")
     assert json.loads(result.stdout)["theorem_5_9"] == "refuted"
+
+
+def test_a_design_with_an_internal_model_is_told_where_its_proof_is(tmp_path):
+    with pytest.raises(ParameterError, match="mrac certify -s reality"):
+        write_stability_report(load_scenario("reality"), tmp_path / "out")
+    assert not (tmp_path / "out").exists()

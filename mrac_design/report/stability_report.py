@@ -11,7 +11,7 @@ from pathlib import Path
 from typing import Any
 
 from mrac_design.assessment.choices import choices_path, load_choices
-from mrac_design.errors import CertificateError
+from mrac_design.errors import CertificateError, ParameterError
 from mrac_design.publishing import publish_contents, staging_folder
 from mrac_design.report.rendering import (
     RESULTS_VARIABLE,
@@ -56,12 +56,19 @@ def write_stability_report(
     `choices` names what is certified and how hard it is tried, packaged or a TOML file. Writes
     report.html, report.pdf, certificate_*.json, values.json, scenario.toml and stability.toml;
     nothing of it appears in `out` before all of it is finished. Every certificate is checked again
-    by the code that knows no solver. Raises what `render_report` raises, and CertificateError when
-    a certificate is refused.
+    by the code that knows no solver. Raises what `render_report` raises, CertificateError when a
+    certificate is refused, ParameterError for a design with an internal model.
     """
     # A mistake in either file is told before anything is run.
     load_choices(choices)
     check_scenario(scenario)
+    if scenario.design.internal_model != (1.0,):
+        raise ParameterError(
+            "scenario",
+            scenario.name,
+            "has an internal model, and this report follows the paper's argument, which has none; "
+            f"prove its stability with: mrac certify -s {scenario.name}",
+        )
     with staging_folder(out) as folder:
         save_scenario(with_absolute_paths(scenario), folder / "scenario.toml")
         shutil.copyfile(choices_path(choices), folder / "stability.toml")
