@@ -61,6 +61,7 @@ def recording(tmp_path):
     return str(file)
 
 
+@pytest.mark.skipif(find_compiler() is None, reason="without a C compiler LLVM is needed")
 def test_simulate_loads_only_what_it_computes_with(recording):
     motion = ("--motion", recording, "--point", "p1", "--frame-rate", "25")
     loaded("simulate", "--duration", "0.6", *motion)  # SciPy smooths a recording once
