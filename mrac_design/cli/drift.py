@@ -38,14 +38,15 @@ def drift(
 
 
 def _print(values: Mapping[str, Any]) -> None:
-    from rich.table import Table
+    from rich.table import Column, Table
 
     table = Table(
-        "motion", "law", "rest (N)", "gains strayed", "largest pole", "rms at work (mN)",
-        "largest (mN)", title="gains from nominal, poles with the gains held, force errors",
+        Column("motion", no_wrap=True), Column("law", no_wrap=True), "rest N", "stray", "|pole|",
+        "work mN", "max mN",
+        title="how far the gains strayed, their largest pole when held, force errors",
     )  # fmt: skip
     for run in values["runs"]:
-        lost = "lost" if run["lost"] is None else f"lost in minute {run['lost'] + 1}"
+        lost = "lost" if run["lost"] is None else f"lost, min {run['lost'] + 1}"
         table.add_row(
             run["motion"],
             run["law"],
