@@ -61,8 +61,9 @@ class FilterChain:
         return ca.vertcat(*reversed(powers))
 
 
-def settled(specification_observer: ca.SX, model: ca.SX, value: ca.SX) -> ca.SX:
-    """States of a chain that has settled on a constant `value`, (n + 2,)."""
-    n = int(specification_observer.numel())
-    level = value / specification_observer[n - 1]
+def settled(observer: ca.SX, model: ca.SX, value: ca.SX) -> ca.SX:
+    """States of a chain that has settled on a constant `value`, (n + 2,); `observer` and `model`
+    as in `FilterChain`."""
+    n = int(observer.numel())
+    level = value / observer[n - 1]
     return ca.vertcat(ca.SX.zeros(n - 1), level, 0, level / model[1])

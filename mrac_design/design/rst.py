@@ -33,6 +33,10 @@ if TYPE_CHECKING:
     import control
 
 
+HIGHEST_DEGREE = 7
+"""Largest degree of an observer: coefficients have names and units up to here."""
+
+
 @dataclass(frozen=True, slots=True, kw_only=True)
 class RSTSpecification:
     """Force plant, reference model, observer and internal model: all that determines R, S and T.
@@ -41,7 +45,8 @@ class RSTSpecification:
     where the heart moves: D = p is an integrator, D = p² + ν² a resonance in the heart's band
     (internal model principle, Francis & Wonham 1976; [AW §3.2]).
 
-    Raises ParameterError when Ao or D is not monic, Ao is not stable, or deg Ao ≠ deg D + 1.
+    Raises ParameterError when Ao or D is not monic, Ao is not stable or of a degree above
+    HIGHEST_DEGREE, or deg Ao ≠ deg D + 1.
     """
 
     plant: ForcePlant
@@ -70,6 +75,10 @@ class RSTSpecification:
                 "observer",
                 self.observer,
                 f"must be of degree {len(self.internal_model)}, one more than the internal model",
+            )
+        if self.degree > HIGHEST_DEGREE:
+            raise ParameterError(
+                "observer", self.observer, f"must be of degree {HIGHEST_DEGREE} at most"
             )
         if not is_stable(self._exact(self.observer), Continuous()):
             raise ParameterError("observer", self.observer, "must have all roots left of 0")

@@ -61,55 +61,37 @@ class Variable:
         return math.log(inside / self.low) / math.log(self.high / self.low)
 
 
+def _variable(section: str, key: str, *, low: float, high: float, **names: str) -> Variable:
+    """A number that stands under `key` in a section of the scenario."""
+
+    def put(scenario: Scenario, value: float) -> Scenario:
+        changed = replace(getattr(scenario, section), **{key: value})
+        return replace(scenario, **{section: changed})
+
+    def read(scenario: Scenario) -> float:
+        return float(getattr(getattr(scenario, section), key))
+
+    return Variable(read=read, put=put, low=low, high=high, **names)
+
+
 VARIABLES: Mapping[str, Variable] = {
     variable.name: variable
     for variable in (
+        _variable("design", "velocity_gain", low=0.0, high=200.0,
+                  name="k2", symbol="K2", unit="1/s"),
+        _variable("adaptation", "gain", low=0.01, high=100.0,
+                  name="gain", symbol="γ̂", unit=""),
         Variable(
-            name="k2",
-            symbol="K2",
-            unit="1/s",
-            read=lambda scenario: scenario.design.velocity_gain,
-            put=lambda scenario, value: replace(
-                scenario, design=replace(scenario.design, velocity_gain=value)
-            ),
-            low=0.0,
-            high=200.0,
-        ),
-        Variable(
-            name="gain",
-            symbol="γ̂",
-            unit="",
-            read=lambda scenario: scenario.adaptation.gain,
-            put=lambda scenario, value: replace(
-                scenario, adaptation=replace(scenario.adaptation, gain=value)
-            ),
-            low=0.01,
-            high=100.0,
-        ),
-        Variable(
-            name="ao",
-            symbol="ao",
-            unit="rad/s",
             read=lambda scenario: scenario.design.observer_pole,
             put=lambda scenario, value: replace(
                 scenario, design=scenario.design.with_observer_pole(value)
             ),
-            low=250.0,
-            high=2000.0,
+            low=250.0, high=2000.0, name="ao", symbol="ao", unit="rad/s",
         ),
-        Variable(
-            name="alpha",
-            symbol="α",
-            unit="N²",
-            read=lambda scenario: scenario.adaptation.normalisation,
-            put=lambda scenario, value: replace(
-                scenario, adaptation=replace(scenario.adaptation, normalisation=value)
-            ),
-            low=1e-3,
-            high=10.0,
-        ),
+        _variable("adaptation", "normalisation", low=1e-3, high=10.0,
+                  name="alpha", symbol="α", unit="N²"),
     )
-}
+}  # fmt: skip
 """What can be tuned, by name, with the range taken when none is given."""
 
 

@@ -85,6 +85,7 @@ def test_without_internal_model_the_adapted_pole_is_that_of_the_observer():
         ((1.0, 5.0), INTEGRATOR, "degree 2"),
         ((1.0, 5.0, 6.0, 7.0), INTEGRATOR, "degree 2"),
         ((1.0, 5.0), (), "begin with 1"),
+        (tuple(np.poly([-1.0] * 8)), (1.0,) + (0.0,) * 7, "degree 7 at most"),
     ],
 )
 def test_what_is_no_observer_or_internal_model_is_refused(observer, internal_model, message):
